@@ -1,0 +1,1 @@
+"""The co-simulation loop: SUMO session, stepping, observing, commanding, scoring."""

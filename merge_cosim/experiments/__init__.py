@@ -1,0 +1,1 @@
+"""Scenarios, sweeps, result store, statistics, training."""

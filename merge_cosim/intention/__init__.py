@@ -1,0 +1,1 @@
+"""Estimators of the merging driver's intention and their learned parts."""

@@ -1,0 +1,1 @@
+"""NGSIM trajectories: reading every published format, pairing cars into encounters."""

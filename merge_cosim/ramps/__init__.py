@@ -1,0 +1,1 @@
+"""Ramps as SUMO networks: sources, built nets, stations, tiles."""

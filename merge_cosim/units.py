@@ -1,0 +1,28 @@
+"""Units and the few constants of time and tolerance that every floor shares. SI everywhere inside."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FOOT = 0.3048
+"""Metres per foot; NGSIM's local coordinates, speeds and lengths are in feet."""
+
+DT = 0.1
+"""Length of one cycle [s]: NGSIM's frame, SUMO's step and the host's update rate."""
+
+TOLERANCE = 1e-6
+"""Stations closer than this [m] are equal: `a >= b` means `a >= b - TOLERANCE`."""
+
+MIN_SPEED = 0.5
+"""Slowest speed [m/s] that a time to arrival is computed with."""
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+AnyArray = NDArray[Any]
+
+
+def time_to_arrival(station: FloatArray, speed: FloatArray) -> FloatArray:
+    """Time [s] to reach station 0 at the present speed: `max(-s, 0) / max(v, 0.5)`."""
+    return np.maximum(-station, 0.0) / np.maximum(speed, MIN_SPEED)

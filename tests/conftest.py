@@ -1,0 +1,21 @@
+"""What the tests share: the real data where it is at hand, and a cache of their own."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """The folder with real NGSIM files; tests that need it are skipped where it is absent."""
+    folder = os.environ.get("MERGE_COSIM_DATA")
+    if not folder or not Path(folder).is_dir():
+        pytest.skip("real NGSIM data not at hand: set MERGE_COSIM_DATA")
+    return Path(folder)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Keep the user's cache out of the tests; one that is set already is kept, so that runs can share it."""
+    os.environ.setdefault("MERGE_COSIM_CACHE", str(tmp_path_factory.mktemp("cache")))
