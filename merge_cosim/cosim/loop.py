@@ -1,0 +1,242 @@
+"""The co-simulation loop: ten times a second observe, estimate, decide and command, for a whole batch at once."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+
+from merge_cosim.control.base import Controller
+from merge_cosim.cosim.plant import NumpyPlant, Plant
+from merge_cosim.cosim.scoring import Rules, Scorer
+from merge_cosim.encounter import NEVER, Encounters
+from merge_cosim.intention.base import Estimator
+from merge_cosim.observation import Observation, Setting
+from merge_cosim.traffic.base import MergingCar
+from merge_cosim.units import AnyArray, BoolArray, FloatArray, IntArray
+
+DECIMALS = 6
+"""What is observed is rounded to 1e-6 m and m/s: the designed grid is full of ties that the last bits would break."""
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A method, ready to drive: an estimator and a controller."""
+
+    estimator: Estimator
+    controller: Controller
+
+
+@dataclass
+class Effort:
+    """What a batch cost.
+
+    Attributes:
+        vehicle_steps: Vehicles times steps of running encounters.
+        encounter_cycles: Cycles of running encounters.
+        wall_s: Time in the loop [s].
+        step_s: Of it, in moving the cars [s].
+        method_s: Of it, in estimating and controlling [s].
+        worst_difference_m: Largest difference between the plant's stations and the closed form [m].
+    """
+
+    vehicle_steps: int = 0
+    encounter_cycles: int = 0
+    wall_s: float = 0.0
+    step_s: float = 0.0
+    method_s: float = 0.0
+    worst_difference_m: float = 0.0
+
+    def add(self, other: Effort) -> None:
+        """Sum two batches."""
+        self.vehicle_steps += other.vehicle_steps
+        self.encounter_cycles += other.encounter_cycles
+        self.wall_s += other.wall_s
+        self.step_s += other.step_s
+        self.method_s += other.method_s
+        self.worst_difference_m = max(self.worst_difference_m, other.worst_difference_m)
+
+
+@dataclass
+class Run:
+    """What came out of a batch of n encounters.
+
+    Attributes:
+        columns: The scorer's measures and the state at the end, shape (n,) each.
+        effort: What it cost.
+        traces: For each traced case, cycle by cycle: `host_station`, `log_odds`, ...
+    """
+
+    columns: dict[str, AnyArray]
+    effort: Effort
+    traces: dict[int, dict[str, list[float]]] = field(default_factory=dict)
+
+
+def simulate(
+    plant: Plant,
+    encounters: Encounters,
+    driver: Driver,
+    merging_car: MergingCar,
+    rules: Rules,
+    setting: Setting,
+    traced: Sequence[int] = (),
+) -> Run:
+    """Run all encounters, `plant.count` at a time, each until it is scored, fails or times out.
+
+    Nothing that a case goes through depends on its tile or on its neighbours, so the outcome of a case is the same
+    whatever the batch and the number of tiles.
+
+    Args:
+        plant: What moves the cars.
+        encounters: The n cases.
+        driver: The host's method.
+        merging_car: How the merging cars drive.
+        rules: When a case is scored.
+        setting: Speed limit and cycle.
+        traced: Indices of the cases to record cycle by cycle.
+    """
+    return _Loop(plant, encounters, driver, merging_car, rules, setting, frozenset(traced)).run()
+
+
+class _Loop:
+    def __init__(
+        self,
+        plant: Plant,
+        encounters: Encounters,
+        driver: Driver,
+        merging_car: MergingCar,
+        rules: Rules,
+        setting: Setting,
+        traced: frozenset[int],
+    ) -> None:
+        count, n = plant.count, len(encounters)
+        self.plant, self.encounters, self.driver, self.merging_car = plant, encounters, driver, merging_car
+        self.setting, self.traced = setting, traced
+        self.scorer = Scorer(count, rules)
+        self.shadow = NumpyPlant(count)
+        self.effort = Effort()
+        self.traces: dict[int, dict[str, list[float]]] = {case: defaultdict(list) for case in traced}
+        driver.estimator.start(count, setting)
+        driver.controller.start(count, setting)
+        merging_car.start(encounters, count, setting)
+        self.case = np.full(count, -1)
+        self.age = np.zeros(count, dtype=np.int64)
+        self.score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
+        self.limit = np.full(count, NEVER)
+        self.host_length, self.merging_length = np.ones(count), np.ones(count)
+        self.next_case = 0
+        self.columns: dict[str, AnyArray] = {
+            "end_cycle": np.zeros(n, dtype=np.int64),
+            "end_station": np.zeros(n),
+            "end_speed": np.zeros(n),
+            "scored_to_end": np.zeros(n, dtype=bool),
+            **{name: np.zeros(n, dtype=column.dtype) for name, column in self.scorer.columns.items()},
+        }
+
+    def run(self) -> Run:
+        begin = perf_counter()
+        self._refill(np.arange(self.plant.count))
+        now = self._observe()
+        while (active := self.case >= 0).any():
+            now = self._cycle(now, active)
+        self.effort.wall_s = perf_counter() - begin
+        return Run(self.columns, self.effort, {case: dict(trace) for case, trace in self.traces.items()})
+
+    def _cycle(self, now: Observation, active: BoolArray) -> Observation:
+        begin = perf_counter()
+        seen = replace(now, merging_speed=self.merging_car.observed_speed(self.age, now.merging_speed))
+        log_odds = self.driver.estimator.update(seen)
+        not_yield = log_odds >= 0.0
+        target = np.where(now.merging_in_lane, now.merging_ahead, not_yield)
+        acceleration = self.driver.controller.command(seen, log_odds, target)
+        host_speed = np.maximum(now.host_speed + acceleration * self.setting.dt, 0.0)
+        decided = perf_counter()
+        merging_speed = np.where(active, self.merging_car.next_speed(self.age, now), 0.0)
+        host_speed = np.where(active, host_speed, 0.0)
+        self.scorer.decided(now, not_yield)
+        if self.traced:
+            self._trace(now, log_odds, not_yield, host_speed)
+        moving = perf_counter()
+        self.plant.advance(host_speed, merging_speed)
+        moved = perf_counter()
+        self.shadow.advance(host_speed, merging_speed)
+        self.age += 1
+        after = self._observe()
+        self._count(active, decided - begin, moved - moving)
+        over = active & (self.scorer.moved(self.age, now, after, self.plant.colliding) | (self.age >= self.limit))
+        if over.any():
+            rows = np.flatnonzero(over)
+            self._finish(rows, after)
+            self._refill(rows)
+            after = self._observe()
+        return after
+
+    def _observe(self) -> Observation:
+        """The plant's state, rounded: the one place where this happens."""
+        plant = self.plant
+        return Observation(
+            np.round(plant.host_station, DECIMALS),
+            np.round(plant.host_speed, DECIMALS),
+            np.round(plant.merging_station, DECIMALS),
+            np.round(plant.merging_speed, DECIMALS),
+            self.host_length,
+            self.merging_length,
+        )
+
+    def _refill(self, rows: IntArray) -> None:
+        cases = np.arange(self.next_case, min(self.next_case + len(rows), len(self.encounters)))
+        self.next_case += len(cases)
+        self.case[rows[len(cases) :]] = -1
+        rows = rows[: len(cases)]
+        if not len(rows):
+            return
+        self.case[rows], self.age[rows] = cases, 0
+        self.limit[rows] = self.score_until[cases]
+        self.host_length[rows] = self.encounters.host_length[cases]
+        self.merging_length[rows] = self.encounters.merging_length[cases]
+        for plant in (self.plant, self.shadow):
+            plant.place(rows, self.encounters, cases)
+        self.merging_car.reset(rows, cases)
+        self.driver.estimator.reset(rows, self.encounters.label[cases])
+        self.driver.controller.reset(rows)
+        self.scorer.reset(rows)
+
+    def _finish(self, rows: IntArray, now: Observation) -> None:
+        cases = self.case[rows]
+        for name, column in self.scorer.columns.items():
+            self.columns[name][cases] = column[rows]
+        self.columns["end_cycle"][cases] = self.age[rows]
+        self.columns["end_station"][cases] = now.host_station[rows]
+        self.columns["end_speed"][cases] = now.host_speed[rows]
+        self.columns["scored_to_end"][cases] = self.scorer.scored_to_end(self.age)[rows]
+
+    def _count(self, active: BoolArray, method_s: float, step_s: float) -> None:
+        running = int(np.count_nonzero(active))
+        self.effort.encounter_cycles += running
+        self.effort.vehicle_steps += 2 * running
+        self.effort.method_s += method_s
+        self.effort.step_s += step_s
+        differences = (
+            np.abs(self.plant.host_station - self.shadow.host_station),
+            np.abs(self.plant.merging_station - self.shadow.merging_station),
+        )
+        worst = float(np.max(np.where(active, np.maximum(*differences), 0.0)))
+        self.effort.worst_difference_m = max(self.effort.worst_difference_m, worst)
+
+    def _trace(self, now: Observation, log_odds: FloatArray, not_yield: BoolArray, next_speed: FloatArray) -> None:
+        for row in np.flatnonzero(np.isin(self.case, list(self.traced))).tolist():
+            trace = self.traces[int(self.case[row])]
+            for name, value in (
+                ("time_s", self.age[row] * self.setting.dt),
+                ("host_station_m", now.host_station[row]),
+                ("host_speed_m_s", now.host_speed[row]),
+                ("host_acceleration_m_s2", (next_speed[row] - now.host_speed[row]) / self.setting.dt),
+                ("merging_station_m", now.merging_station[row]),
+                ("merging_speed_m_s", now.merging_speed[row]),
+                ("log_odds", log_odds[row]),
+                ("not_yield", not_yield[row]),
+            ):
+                trace[name].append(float(value))

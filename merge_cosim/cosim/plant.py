@@ -1,0 +1,158 @@
+"""Plants, which move the cars of a batch: SUMO on tiles of the ramp, and the closed form as its check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, Protocol
+
+import numpy as np
+
+from merge_cosim.cosim.session import Car, LibsumoSession, Session, SumoOptions
+from merge_cosim.encounter import Encounters
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.tiles import tile_id, tile_net
+from merge_cosim.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
+
+COLORS = ((40, 160, 60, 255), (210, 50, 40, 255))
+"""Host and merging car, as in the papers' figures (RGBA)."""
+
+
+class Plant(Protocol):
+    """Moves one host and one merging car in each of `count` tiles.
+
+    Attributes:
+        count: Number of tiles.
+        host_station, host_speed, merging_station, merging_speed: The state, shape (count,) each [m, m/s].
+        colliding: Tiles in which SUMO reports a contact in the last step, shape (count,).
+    """
+
+    count: int
+    host_station: FloatArray
+    host_speed: FloatArray
+    merging_station: FloatArray
+    merging_speed: FloatArray
+    colliding: BoolArray
+
+    def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
+        """Put the encounters `cases` at their initial states into `tiles`."""
+
+    def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
+        """Drive all cars one cycle with the given speeds [m/s]."""
+
+
+class NumpyPlant:
+    """The closed form: `s' = s + v dt` with the commanded speed."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.host_station, self.host_speed = np.zeros(count), np.zeros(count)
+        self.merging_station, self.merging_speed = np.zeros(count), np.zeros(count)
+        self.colliding = np.zeros(count, dtype=bool)
+
+    def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
+        """See `Plant`."""
+        self.host_station[tiles] = encounters.host_station[cases]
+        self.host_speed[tiles] = encounters.host_speed[cases]
+        self.merging_station[tiles] = encounters.merging_station[cases]
+        self.merging_speed[tiles] = encounters.merging_speed[cases]
+
+    def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
+        """See `Plant`."""
+        self.host_speed, self.merging_speed = host_speed, merging_speed
+        self.host_station = self.host_station + host_speed * DT
+        self.merging_station = self.merging_station + merging_speed * DT
+
+
+class SumoPlant:
+    """SUMO drives the cars on disconnected copies of a ramp; they are added once and moved to each next start.
+
+    Stations come from SUMO's lane positions, which depend on a car's own start and speeds alone; the odometer would
+    carry the rounding of all earlier encounters in its tile.
+    """
+
+    def __init__(
+        self,
+        ramp: Ramp,
+        count: int,
+        seed: int = 0,
+        open_session: Callable[[SumoOptions], Session] = LibsumoSession,
+        extra: tuple[str, ...] = (),
+    ) -> None:
+        self.ramp = ramp
+        self.count = count
+        self.session = open_session(SumoOptions(tile_net(ramp, count), seed=seed, extra=extra))
+        self._names = [tile_id(tile, car) for car in ("host", "merging") for tile in range(count)]
+        self._row = {name: row for row, name in enumerate(self._names)}
+        routes = (ramp.main_route, ramp.ramp_route)
+        self.session.add(
+            Car(name, tuple(tile_id(row % count, edge) for edge in routes[row // count]), COLORS[row // count])
+            for name, row in self._row.items()
+        )
+        start = {section.edge: section.start for section in ramp.main + ramp.ramp}
+        self._edge_start = np.array([start[edge] for route in routes for edge in route])
+        self._edge_number = [{edge: i for i, edge in enumerate(routes[0])}]
+        self._edge_number += [{edge: i + len(routes[0]) for i, edge in enumerate(routes[1])}]
+        self._edge = np.repeat([0, len(routes[0])], count)
+        self._position = np.zeros(2 * count)
+        self._merge_position = np.zeros(2 * count)
+        self._length = np.full(2 * count, np.nan)
+        self._in_host_lane = np.ones(count, dtype=bool)
+        self.host_station, self.host_speed = np.zeros(count), np.zeros(count)
+        self.merging_station, self.merging_speed = np.zeros(count), np.zeros(count)
+        self.colliding = np.zeros(count, dtype=bool)
+
+    def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
+        """See `Plant`."""
+        self.host_station[tiles] = encounters.host_station[cases]
+        self.host_speed[tiles] = encounters.host_speed[cases]
+        self.merging_station[tiles] = encounters.merging_station[cases]
+        self.merging_speed[tiles] = encounters.merging_speed[cases]
+        self._in_host_lane[tiles] = not self.ramp.changes_lane
+        for tile, case in zip(tiles.tolist(), cases.tolist(), strict=True):
+            self._merge_position[[tile, tile + self.count]] = encounters.merge_position[case]
+            self._place(tile, "main", self.host_station[tile], self.host_speed[tile], encounters.host_length[case])
+            self._place(
+                tile + self.count,
+                "ramp",
+                self.merging_station[tile],
+                self.merging_speed[tile],
+                encounters.merging_length[case],
+            )
+
+    def _place(self, row: int, path: Literal["main", "ramp"], station: float, speed: float, length: float) -> None:
+        name, tile = self._names[row], row % self.count
+        where = self.ramp.place(path, float(station), float(self._merge_position[row]))
+        self.session.place(name, tile_id(tile, f"{where.edge}_{where.lane}"), where.position, float(speed))
+        self._edge[row] = self._edge_number[path == "ramp"][where.edge]
+        self._position[row] = where.position
+        if self._length[row] != length:
+            self.session.set_length(name, float(length))
+            self._length[row] = length
+
+    def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
+        """See `Plant`; a merging car whose front reaches the merging point in this cycle changes lane in it."""
+        arrives = ~self._in_host_lane & (self.merging_station + merging_speed * DT >= -TOLERANCE)
+        for tile in np.flatnonzero(arrives).tolist():
+            reached = self.merging_station[tile] + merging_speed[tile] * DT
+            edge = self.ramp.place("main", max(float(reached), 0.0), float(self._merge_position[tile])).edge
+            self.session.change_lane(self._names[tile + self.count], self.ramp.host_lane_on(edge))
+        self._in_host_lane |= arrives
+        self.session.command(self._names, np.concatenate([host_speed, merging_speed]).tolist())
+        self.session.step()
+        self._read()
+
+    def _read(self) -> None:
+        position = np.fromiter(self.session.positions(self._names), np.float64, 2 * self.count)
+        speed = np.fromiter(self.session.speeds(self._names), np.float64, 2 * self.count)
+        self._edge += position < self._position  # cars never back up, so a smaller position is the next edge's
+        self._position = position
+        station = position + self._edge_start[self._edge] - self._merge_position
+        self.host_station, self.merging_station = station[: self.count], station[self.count :]
+        self.host_speed, self.merging_speed = speed[: self.count], speed[self.count :]
+        self.colliding = np.zeros(self.count, dtype=bool)
+        for name in self.session.colliding():
+            self.colliding[self._row[name] % self.count] = True
+
+    def close(self) -> None:
+        """End the simulation."""
+        self.session.close()

@@ -1,0 +1,205 @@
+"""The seam to SUMO: one small protocol, by libsumo in this process or by TraCI to another."""
+
+from __future__ import annotations
+
+import sys
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from merge_cosim.errors import UserError
+from merge_cosim.units import DT
+
+SPEED_MODE_UNCHECKED = 32
+"""SUMO drives the commanded speed exactly: no safe-speed, right-of-way or acceleration check."""
+LANE_CHANGE_MODE_NONE = 0
+"""SUMO changes no lane by itself."""
+
+
+@dataclass(frozen=True)
+class SumoOptions:
+    """What is set, and recorded, for every SUMO run.
+
+    Attributes:
+        net: The network.
+        seed: SUMO's seed.
+        step_length: Length of a step [s].
+        collision_action: What SUMO does about a contact; `warn` reports it and leaves the cars alone.
+        check_junctions: Contacts on junctions count, too.
+        extra: Further options as SUMO takes them.
+    """
+
+    net: Path
+    seed: int = 0
+    step_length: float = DT
+    collision_action: str = "warn"
+    check_junctions: bool = False
+    extra: tuple[str, ...] = ()
+
+    def arguments(self) -> list[str]:
+        """The options as SUMO's command line has them."""
+        options = {
+            "--net-file": self.net,
+            "--step-length": self.step_length,
+            "--seed": self.seed,
+            "--time-to-teleport": -1,
+            "--collision.action": self.collision_action,
+            "--collision.mingap-factor": 0,
+            "--collision.check-junctions": str(self.check_junctions).lower(),
+            "--no-step-log": "true",
+            "--no-warnings": "true",
+            "--duration-log.disable": "true",
+            "--xml-validation": "never",
+        }
+        return [str(word) for pair in options.items() for word in pair] + list(self.extra)
+
+
+@dataclass(frozen=True)
+class Car:
+    """A car to put into the simulation.
+
+    Attributes:
+        name: SUMO's vehicle id.
+        route: Edge ids.
+        lane: Index of the lane on the first edge that it starts on.
+        color: RGBA.
+    """
+
+    name: str
+    route: tuple[str, ...]
+    color: tuple[int, int, int, int]
+
+
+class Session(Protocol):
+    """What the loop needs of SUMO; ids are SUMO's vehicle ids."""
+
+    def add(self, cars: Iterable[Car]) -> None:
+        """Put cars in that drive exactly as commanded; they stand until they are placed."""
+
+    def place(self, car: str, lane: str, position: float, speed: float) -> None:
+        """Put a car on a lane [SUMO id], its front bumper at `position` [m], as if it had come with `speed` [m/s]."""
+
+    def set_length(self, car: str, length: float) -> None:
+        """Set a car's length [m]."""
+
+    def change_lane(self, car: str, index: int) -> None:
+        """Bring a car to the lane `index` of its edge within the next step."""
+
+    def command(self, cars: Sequence[str], speeds: Sequence[float]) -> None:
+        """Set the speeds [m/s] of the next step."""
+
+    def step(self) -> None:
+        """Simulate one step."""
+
+    def positions(self, cars: Sequence[str]) -> Iterable[float]:
+        """Positions [m] of the front bumpers on the cars' present lanes."""
+
+    def speeds(self, cars: Sequence[str]) -> Iterable[float]:
+        """Speeds [m/s]."""
+
+    def colliding(self) -> Sequence[str]:
+        """Cars in a contact that SUMO reports for the last step."""
+
+    def close(self) -> None:
+        """End the simulation."""
+
+
+class _ApiSession:
+    """What libsumo and TraCI share: the same modules with the same functions."""
+
+    def __init__(self, api: Any, vehicle_set_speed: Callable[[str, float], None], errors: tuple[type[Exception], ...]):
+        self._api = api
+        self._set_speed = vehicle_set_speed
+        self._errors = errors
+        self.step: Callable[[], None] = api.simulationStep
+
+    def add(self, cars: Iterable[Car]) -> None:
+        """See `Session`."""
+        vehicle, types = self._api.vehicle, self._api.vehicletype
+        types.copy("DEFAULT_VEHTYPE", "controlled")
+        types.setImperfection("controlled", 0.0)
+        types.setSpeedDeviation("controlled", 0.0)
+        types.setMinGap("controlled", 0.0)
+        cars = list(cars)
+        for car in cars:
+            self._api.route.add(f"route.{car.name}", car.route)
+            vehicle.add(car.name, f"route.{car.name}", typeID="controlled", departLane="free", departSpeed="0")
+            vehicle.setSpeedMode(car.name, SPEED_MODE_UNCHECKED)
+            vehicle.setLaneChangeMode(car.name, LANE_CHANGE_MODE_NONE)
+            vehicle.setColor(car.name, car.color)
+            vehicle.setSpeed(car.name, 0.0)
+        self.step()
+        missing = {car.name for car in cars} - set(vehicle.getIDList())
+        if missing:
+            raise RuntimeError(f"SUMO did not insert {sorted(missing)[:3]} ({len(missing)} of {len(cars)} cars)")
+
+    def place(self, car: str, lane: str, position: float, speed: float) -> None:
+        """See `Session`."""
+        self._api.vehicle.moveTo(car, lane, position)
+        self._api.vehicle.setPreviousSpeed(car, speed)
+
+    def set_length(self, car: str, length: float) -> None:
+        """See `Session`."""
+        self._api.vehicle.setLength(car, length)
+
+    def change_lane(self, car: str, index: int) -> None:
+        """See `Session`."""
+        self._api.vehicle.changeLane(car, index, 0.0)
+
+    def command(self, cars: Sequence[str], speeds: Sequence[float]) -> None:
+        """See `Session`."""
+        deque(map(self._set_speed, cars, speeds), maxlen=0)
+
+    def positions(self, cars: Sequence[str]) -> Iterable[float]:
+        """See `Session`."""
+        return map(self._api.vehicle.getLanePosition, cars)
+
+    def speeds(self, cars: Sequence[str]) -> Iterable[float]:
+        """See `Session`."""
+        return map(self._api.vehicle.getSpeed, cars)
+
+    def colliding(self) -> Sequence[str]:
+        """See `Session`."""
+        found: Sequence[str] = self._api.simulation.getCollidingVehiclesIDList()
+        return found
+
+    def close(self) -> None:
+        """See `Session`."""
+        self._api.close()
+
+
+class LibsumoSession(_ApiSession):
+    """SUMO inside this process. libsumo holds one simulation per process: opening a second one ends the first."""
+
+    def __init__(self, options: SumoOptions) -> None:
+        import libsumo
+        from libsumo import _libsumo  # the raw setter spares a Python frame per car and step
+
+        errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
+        super().__init__(libsumo, _libsumo.vehicle_setSpeed, errors)
+        _open(lambda: libsumo.start(["sumo", *options.arguments()]), options, errors)
+
+
+class TraciSession(_ApiSession):
+    """SUMO, or sumo-gui, in a process of its own."""
+
+    def __init__(self, options: SumoOptions, gui: bool = False) -> None:
+        import sumolib
+        import traci
+
+        if "libsumo" in str(getattr(traci, "__file__", "")):
+            raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
+        errors = (traci.TraCIException, traci.FatalTraCIError)
+        super().__init__(traci, traci.vehicle.setSpeed, errors)
+        binary = sumolib.checkBinary("sumo-gui" if gui else "sumo")
+        _open(lambda: traci.start([binary, *options.arguments()], stdout=sys.stderr), options, errors)
+
+
+def _open(start: Callable[[], object], options: SumoOptions, errors: tuple[type[Exception], ...]) -> None:
+    try:
+        start()
+    except errors as error:
+        reason = str(error).strip().splitlines()
+        raise UserError(f"{options.net}: SUMO cannot start: {reason[-1] if reason else 'no reason given'}") from None
