@@ -1,0 +1,236 @@
+"""The command `merge-cosim`: options and printing, no logic. Heavy imports wait until a command needs them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from merge_cosim.cli import ngsim, ramp
+from merge_cosim.cli.show import die, print_json, show_table
+from merge_cosim.errors import UserError
+
+app = typer.Typer(
+    help=__import__("merge_cosim").__doc__,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.add_typer(ngsim.app, name="ngsim")
+app.add_typer(ramp.app, name="ramp")
+
+SHOWN = (
+    *("scenario", "variation", "site", "source", "method", "n", "failures", "failure_pct", "ci_low_pct", "ci_high_pct"),
+    *("censored", "host_not_reached", "distance_m", "delay_s", "hardest_braking", "unnecessary_yields", "cycle_us"),
+)
+"""Columns of the summary that fit a terminal."""
+
+Source = Literal["ngsim", "surrogate"]
+Data = Annotated[Path | None, typer.Option(help="Folder with NGSIM files (else $MERGE_COSIM_DATA, else ./data).")]
+Model = Annotated[str | None, typer.Option(help="Model file, or name of a model that comes with the project.")]
+Sets = Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, such as acc.headway=1.2 or test.horizon=5.")]
+Plugins = Annotated[list[Path] | None, typer.Option(help="Python file with components of your own.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+Seed = Annotated[int, typer.Option(help="SUMO's seed.")]
+
+
+@app.command()
+def sweep(
+    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios or scenario files.")],
+    method: Annotated[
+        list[str] | None, typer.Option(help="Estimator, or estimator+controller; all if not given.")
+    ] = None,
+    model: Model = None,
+    set_: Sets = None,
+    vary: Annotated[list[str] | None, typer.Option(help="NAME=A:B:STEP or NAME=X,Y,Z; one at a time.")] = None,
+    data: Data = None,
+    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    seed: Seed = 0,
+    plugin: Plugins = None,
+    out: Annotated[Path, typer.Option(help="Result folder.")] = Path("out"),
+    jobs: Annotated[int, typer.Option(min=1, help="Processes; one per core if not given.")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="Finish an interrupted sweep.")] = False,
+    json: Json = False,
+) -> None:
+    """Run scenarios under methods and store one row per case."""
+    import os
+
+    from merge_cosim.cli.progress import sweep_progress
+    from merge_cosim.experiments.methods import parse_setting, parse_variation
+    from merge_cosim.experiments.sweep import SweepRequest
+    from merge_cosim.experiments.sweep import sweep as run_sweep
+    from merge_cosim.ngsim.data import find_data
+
+    request = SweepRequest(
+        scenarios=scenarios,
+        methods=method or (),
+        model=model,
+        settings=dict(map(parse_setting, set_ or ())),
+        variations=[parse_variation(text) for text in vary or ()],
+        data=find_data(data),
+        source=source,
+        seed=seed,
+        plugins=plugin or (),
+        jobs=jobs or os.cpu_count() or 1,
+    )
+    with sweep_progress() as progress:
+        run_sweep(request, out, resume, progress)
+    from merge_cosim.experiments.store import MANIFEST, SUMMARY_JSON, ResultFolder
+
+    folder = ResultFolder(out)
+    if json:
+        print_json({"summary": folder.read_json(SUMMARY_JSON), "manifest": folder.read_json(MANIFEST)})
+    else:
+        rows = [{name: row[name] for name in SHOWN} for row in folder.read_json(SUMMARY_JSON)]
+        show_table(rows, f"{out}: {', '.join(scenarios)}")
+
+
+@app.command()
+def run(
+    scenario: Annotated[str, typer.Argument(help="Shipped scenario or scenario file.")],
+    case: Annotated[str, typer.Option(help="Case, as in the column 'case' of results.parquet.")],
+    method: Annotated[str, typer.Option(help="Estimator, or estimator+controller.")],
+    model: Model = None,
+    set_: Sets = None,
+    data: Data = None,
+    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    seed: Seed = 0,
+    plugin: Plugins = None,
+    gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui.")] = False,
+    delay: Annotated[int, typer.Option(help="With --gui: milliseconds per step.")] = 100,
+    trace: Annotated[Path | None, typer.Option(help="Write every cycle to this file (.csv or .parquet).")] = None,
+    json: Json = False,
+) -> None:
+    """Run one case alone; its outcome is the same as in a sweep."""
+    from merge_cosim.experiments.methods import parse_setting
+    from merge_cosim.experiments.single import run_single
+    from merge_cosim.experiments.sweep import SweepRequest
+    from merge_cosim.ngsim.data import find_data
+
+    request = SweepRequest(
+        scenarios=[scenario],
+        methods=[method],
+        model=model,
+        settings=dict(map(parse_setting, set_ or ())),
+        data=find_data(data),
+        source=source,
+        seed=seed,
+        plugins=plugin or (),
+    )
+    row = run_single(request, case, gui_delay=delay if gui else None, trace=trace)
+    if json:
+        print_json(row)
+    else:
+        for name, value in row.items():
+            typer.echo(f"{name:18} {value}")
+
+
+@app.command()
+def train(
+    out: Annotated[Path, typer.Option(help="Model file to write (.json).")],
+    data: Data = None,
+    site: Annotated[Literal["us101", "i80"], typer.Option(help="Site to train on.")] = "us101",
+    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    split: Annotated[Literal["car", "pair"], typer.Option(help="What is kept together on one side.")] = "car",
+    seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
+    json: Json = False,
+) -> None:
+    """Learn speed transitions, times to arrival and the prior from one third of a site's pairs."""
+    from merge_cosim.experiments.training import train as train_model
+    from merge_cosim.ngsim.data import find_data
+
+    report = train_model(site, find_data(data), source, split, seed, out)
+    if json:
+        print_json(report)
+    else:
+        typer.echo(
+            f"{out}: trained on {report['train_pairs']} pairs of {report['train_cars']} cars ({report['source']})"
+        )
+        show_table(report["held_out"], "held-out merging cars, by distance to the merging point")
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
+    json: Json = False,
+) -> None:
+    """Make one offline HTML page of a sweep: tables, failure maps, one case in detail."""
+    from merge_cosim.report.page import write_report
+
+    file = write_report(folder)
+    if json:
+        print_json({"report": str(file)})
+    else:
+        typer.echo(file)
+
+
+@app.command()
+def methods(plugin: Plugins = None, json: Json = False) -> None:
+    """List estimators, controllers and merging cars with their parameters."""
+    from merge_cosim.experiments.catalogue import components
+
+    rows = components(plugin or ())
+    if json:
+        print_json(rows)
+    else:
+        show_table(
+            [{k: v for k, v in row.items() if k != "parameters"} | {"parameters": _listed(row)} for row in rows], ""
+        )
+
+
+@app.command()
+def scenarios(json: Json = False) -> None:
+    """List the shipped scenarios."""
+    from merge_cosim.experiments.scenario import load_scenario, scenario_names
+
+    rows = [load_scenario(name) for name in scenario_names()]
+    listed = [{"scenario": one.name, "title": one.title, "ramp": one.ramp, "about": one.about.strip()} for one in rows]
+    if json:
+        print_json(listed)
+    else:
+        show_table(listed, "")
+
+
+@app.command()
+def cache(clear: Annotated[bool, typer.Option("--clear", help="Delete it.")] = False, json: Json = False) -> None:
+    """Show what is kept of generated data, and where."""
+    import shutil
+
+    from merge_cosim.files import cache_folder
+
+    folder = cache_folder()
+    rows = []
+    for part in sorted(path for path in folder.iterdir() if path.is_dir()):
+        files = [file for file in part.rglob("*") if file.is_file()]
+        rows.append(
+            {"part": part.name, "files": len(files), "mib": round(sum(f.stat().st_size for f in files) / 2**20, 2)}
+        )
+        if clear:
+            shutil.rmtree(part)
+    if json:
+        print_json({"folder": str(folder), "cleared": clear, "parts": rows})
+    else:
+        show_table(rows, f"{folder}{' (cleared)' if clear else ''}")
+
+
+def _listed(row: dict[str, object]) -> str:
+    values = row["parameters"]
+    return ", ".join(f"{key}={value}" for key, value in values.items()) if isinstance(values, dict) else ""
+
+
+def main() -> None:
+    """Run the command line; a user's mistake is one line and exit status 2."""
+    try:
+        app()
+    except UserError as error:
+        die(str(error))
+    except KeyboardInterrupt:
+        typer.echo("interrupted; what was finished is kept, go on with --resume", err=True)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

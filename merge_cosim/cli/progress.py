@@ -1,0 +1,16 @@
+"""A progress bar on standard error."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def sweep_progress() -> Iterator[Callable[[int, int, str], None]]:
+    """Yield a function that takes the cases done, the cases in all, and what is being run."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description:32}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("preparing", total=None)
+        yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)

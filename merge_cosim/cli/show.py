@@ -1,0 +1,40 @@
+"""Printing: tables for people, JSON for programs, one line for mistakes."""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any, NoReturn
+
+
+def print_json(document: Any) -> None:
+    """Print one JSON document on standard output."""
+    print(json.dumps(document, indent=1, default=str))
+
+
+def die(message: str) -> NoReturn:
+    """Say in one line what the user can mend, and end with status 2."""
+    print(f"merge-cosim: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)
+
+
+def show_table(rows: Sequence[Mapping[str, Any]], title: str) -> None:
+    """Print rows as a table; columns without any value are left out."""
+    from rich.console import Console
+    from rich.table import Table
+
+    columns = [name for name in (rows[0] if rows else {}) if any(row[name] not in (None, "") for row in rows)]
+    table = Table(title=title or None, title_justify="left", header_style="bold")
+    for name in columns:
+        table.add_column(name, justify="left" if any(isinstance(row[name], str) for row in rows) else "right")
+    for row in rows:
+        table.add_row(*(_text(row[name]) for name in columns))
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=max(120, 14 * len(columns)))
+    console.print(table)
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if isinstance(value, float) else str(value)

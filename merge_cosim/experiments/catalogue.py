@@ -1,0 +1,30 @@
+"""What there is: every registered component with its parameters."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from merge_cosim.control.base import controllers
+from merge_cosim.experiments.methods import CONSTANT, ORACLE_BEST
+from merge_cosim.intention.base import estimators
+from merge_cosim.registry import Registry, load_plugin, parameters
+from merge_cosim.traffic.base import merging_cars
+
+
+def components(plugins: Sequence[Path] = ()) -> list[dict[str, Any]]:
+    """Return role, name, parameters (with defaults) and first line of the documentation of each component."""
+    for plugin in plugins:
+        load_plugin(plugin)
+    registries: tuple[Registry[Any], ...] = (estimators, controllers, merging_cars)
+    rows = [
+        {
+            "role": registry.role,
+            "name": name,
+            "about": (registry[name].__doc__ or "").strip().splitlines()[0],
+            "parameters": parameters(registry[name]),
+        }
+        for registry in registries
+        for name in registry.names()
+    ]
+    derived = f"The better of {' and '.join(CONSTANT)} on each case (made by the statistics)."
+    return [*rows, {"role": "derived", "name": ORACLE_BEST, "about": derived, "parameters": {}}]

@@ -1,0 +1,158 @@
+"""Methods: an estimator and a controller, named `pgm` or `pgm+lqr`, with parameters from the command line."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from merge_cosim.control.base import controllers
+from merge_cosim.cosim.loop import Driver
+from merge_cosim.encounter import Encounters
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.scenario import SECTIONS
+from merge_cosim.intention.base import estimators
+from merge_cosim.intention.model import IntentionModel
+from merge_cosim.registry import did_you_mean, parameters
+
+ORACLE_BEST = "oracle-best"
+"""The better of always-go and always-yield on each case: a row made by the statistics, no estimator."""
+CONSTANT = ("always-go", "always-yield")
+"""The methods that `oracle-best` chooses from."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A named pair of an estimator and a controller, with the parameters that were set.
+
+    Attributes:
+        name: As the user wrote it.
+        estimator, controller: Names of the two.
+        settings: Parameters by `component.parameter`.
+    """
+
+    name: str
+    estimator: str
+    controller: str
+    settings: tuple[tuple[str, Any], ...] = ()
+
+    @classmethod
+    def parse(cls, name: str, settings: Mapping[str, Any] | None = None) -> Method:
+        """Read `estimator` or `estimator+controller`.
+
+        Raises:
+            UserError: One of them is unknown, or a parameter is wrong.
+        """
+        estimator, _, controller = name.partition("+")
+        chosen = controller or estimators[estimator].default_controller
+        method = cls(name, estimator, chosen, tuple(sorted((settings or {}).items())))
+        method.driver(None)
+        return method
+
+    @property
+    def needs_model(self) -> bool:
+        """Its estimator rests on a trained model."""
+        return estimators[self.estimator].needs_model
+
+    @property
+    def needs_label(self) -> bool:
+        """Its estimator looks at the label."""
+        return estimators[self.estimator].needs_label
+
+    def driver(self, model: IntentionModel | None) -> Driver:
+        """Make the two parts; `model` goes to an estimator that needs one."""
+        estimator = estimators.build(
+            self.estimator, self._values(self.estimator, estimators[self.estimator]), self.name
+        )
+        controller = controllers.build(
+            self.controller, self._values(self.controller, controllers[self.controller]), self.name
+        )
+        if estimator.needs_model and model is not None:
+            estimator.use(model)
+        return Driver(estimator, controller)
+
+    def _values(self, component: str, cls: type) -> dict[str, Any]:
+        names = (key.partition(".") for key, _ in self.settings)
+        values = {
+            name: value for (owner, _, name), (_, value) in zip(names, self.settings, strict=True) if owner == component
+        }
+        return {name: value for name, value in values.items() if name in parameters(cls)}
+
+
+def default_methods() -> list[str]:
+    """Every registered estimator, with the papers' rivals and the references."""
+    return [*estimators.names(), ORACLE_BEST]
+
+
+def methods_for(encounters: Encounters, methods: Iterable[Method]) -> list[Method]:
+    """The methods that can run on these encounters: those that look at labels need labels."""
+    labelled = bool((encounters.label >= 0).all())
+    return [method for method in methods if labelled or not method.needs_label]
+
+
+def split_settings(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Part settings into those of scenarios (`test.horizon`) and those of components (`acc.headway`).
+
+    Raises:
+        UserError: A name belongs to neither.
+    """
+    of_scenario: dict[str, Any] = {}
+    of_components: dict[str, Any] = {}
+    for name, value in settings.items():
+        owner, _, parameter = name.partition(".")
+        classes = [registry[owner] for registry in (estimators, controllers) if owner in registry]
+        if any(parameter in parameters(cls) for cls in classes):
+            of_components[name] = value
+        elif owner in SECTIONS and owner != "name":
+            of_scenario[name] = value
+        elif classes:
+            known = sorted({one for cls in classes for one in parameters(cls)})
+            raise UserError(f"{name}: '{owner}' has no parameter '{parameter}'{did_you_mean(parameter, known)}")
+        else:
+            choices = [*SECTIONS, *estimators.names(), *controllers.names()]
+            raise UserError(f"{name}: nothing is called '{owner}'{did_you_mean(owner, choices)}")
+    return of_scenario, of_components
+
+
+def parse_value(text: str) -> Any:
+    """Read a value as TOML does (numbers, true, lists); what is no TOML is a string."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """Read `NAME=VALUE`.
+
+    Raises:
+        UserError: There is no `=`.
+    """
+    name, equals, value = text.partition("=")
+    if not equals or not name or not value:
+        raise UserError(f"--set {text}: write NAME=VALUE, such as acc.headway=1.2")
+    return name.strip(), parse_value(value.strip())
+
+
+def parse_variation(text: str) -> tuple[str, list[Any]]:
+    """Read `NAME=A:B:STEP` (both ends included) or `NAME=X,Y,Z`.
+
+    Raises:
+        UserError: It is neither.
+    """
+    name, values = parse_setting(text)
+    if not isinstance(values, str):
+        return name, [values]
+    if ":" not in values:
+        return name, [parse_value(value.strip()) for value in values.split(",")]
+    try:
+        first, last, step = (float(part) for part in values.split(":"))
+        count = round((last - first) / step)
+    except (ValueError, ZeroDivisionError):
+        count = -1
+    if count < 0:
+        raise UserError(f"--vary {text}: write NAME=A:B:STEP with A <= B, or NAME=X,Y,Z")
+    whole = all(part == round(part) for part in (first, step))
+    steps = [round(first + i * step, 9) for i in range(count + 1)]
+    return name, [int(value) for value in steps] if whole else steps

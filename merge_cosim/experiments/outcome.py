@@ -1,0 +1,152 @@
+"""From the scorer's measures to result rows: one per (scenario, case, method), with a fixed schema."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+
+from merge_cosim.control.acc import Acc
+from merge_cosim.cosim.loop import Run
+from merge_cosim.cosim.scoring import GOAL, KINDS
+from merge_cosim.encounter import NEVER, Encounters, Intention
+from merge_cosim.observation import Setting
+from merge_cosim.units import AnyArray, BoolArray, FloatArray
+
+SCHEMA_VERSION = "1"
+SCHEMA = pa.schema(
+    [
+        ("scenario", pa.string()),
+        ("variation", pa.string()),
+        ("site", pa.string()),
+        ("source", pa.string()),
+        ("case", pa.string()),
+        ("car", pa.string()),
+        ("method", pa.string()),
+        ("model", pa.string()),
+        ("failed", pa.bool_()),
+        ("failure_kind", pa.string()),
+        ("censored", pa.bool_()),
+        ("extended", pa.bool_()),
+        ("smoothed_source", pa.bool_()),
+        ("host_reached", pa.bool_()),
+        ("host_first", pa.bool_()),
+        ("order_swapped", pa.bool_()),
+        ("label", pa.string()),
+        ("correct_at_merge", pa.bool_()),
+        ("decision_flips", pa.int32()),
+        ("distance_m", pa.float64()),
+        ("gap_m", pa.float64()),
+        ("min_gap_m", pa.float64()),
+        ("min_ttc_s", pa.float64()),
+        ("delay_s", pa.float64()),
+        ("hardest_braking", pa.float64()),
+        ("host_reached_s", pa.float64()),
+        ("merging_reached_s", pa.float64()),
+        ("end_s", pa.float64()),
+        ("ambiguity_s", pa.float64()),
+        ("sumo_collision", pa.bool_()),
+    ],
+    metadata={"merge_cosim_schema": SCHEMA_VERSION},
+)
+KEY = [("scenario", "ascending"), ("variation", "ascending"), ("case", "ascending"), ("method", "ascending")]
+
+
+def result_rows(run: Run, encounters: Encounters, setting: Setting, free_law: Acc, names: dict[str, str]) -> pa.Table:
+    """Return the result rows of a run.
+
+    Args:
+        run: The run.
+        encounters: Its n cases.
+        setting: Speed limit and cycle.
+        free_law: The controller whose free driving the delay is measured against.
+        names: `scenario`, `variation`, `method` and `model` of all rows.
+    """
+    c, n, dt = run.columns, len(encounters), setting.dt
+    failed = c["kind"] > 0
+    labelled = encounters.label >= 0
+    decided = labelled & (c["last_decision"] >= 0)
+    host_first = _earlier(c["host_reached_s"], c["merging_reached_s"])
+    order_known = ~(np.isnan(c["host_reached_s"]) & np.isnan(c["merging_reached_s"]))
+    if encounters.log is None:
+        last_logged = np.full(n, NEVER)
+        score_until = np.full(n, NEVER)
+    else:
+        last_logged = encounters.log.merging_station.lengths - 1
+        score_until = encounters.log.score_until
+    unfinished = ~failed & ~c["scored_to_end"]
+    ambiguity = np.abs(
+        -encounters.merging_station / np.maximum(encounters.merging_speed, 0.5)
+        + np.minimum(encounters.host_station, 0.0) / np.maximum(encounters.host_speed, 0.5)
+    )
+    columns: dict[str, AnyArray | pa.Array] = {
+        "site": encounters.site,
+        "source": encounters.source,
+        "case": encounters.case,
+        "car": encounters.car,
+        "failed": failed,
+        "failure_kind": np.array(KINDS)[c["kind"]],
+        "censored": unfinished & ((c["end_cycle"] >= score_until) | (c["scored_from"] >= 0)),
+        "extended": c["end_cycle"] > last_logged,
+        "smoothed_source": encounters.smoothed_source,
+        "host_reached": ~np.isnan(c["host_reached_s"]) | (encounters.host_station >= 0),
+        "host_first": _masked(host_first, order_known),
+        "order_swapped": _masked(host_first != (encounters.label == Intention.YIELD), order_known & labelled),
+        "label": np.array(["YIELD", "NOT_YIELD", ""])[encounters.label],
+        "correct_at_merge": _masked(c["last_decision"] == encounters.label, decided),
+        "decision_flips": c["decision_flips"].astype(np.int32),
+        "distance_m": _finite(c["distance_m"]),
+        "gap_m": _finite(c["gap_m"]),
+        "min_gap_m": _finite(c["min_gap_m"]),
+        "min_ttc_s": _finite(c["min_ttc_s"]),
+        "delay_s": _delay(c, encounters, setting, free_law),
+        "hardest_braking": c["hardest_braking"],
+        "host_reached_s": _finite(c["host_reached_s"]),
+        "merging_reached_s": _finite(c["merging_reached_s"]),
+        "end_s": c["end_cycle"] * dt,
+        "ambiguity_s": ambiguity,
+        "sumo_collision": c["sumo_collision"].astype(bool),
+    }
+    arrays = []
+    for column in SCHEMA:
+        if column.name in names:
+            arrays.append(pa.array([names[column.name]] * n, column.type))
+        elif isinstance(columns[column.name], pa.Array):
+            arrays.append(columns[column.name])
+        else:
+            arrays.append(pa.array(columns[column.name], column.type))
+    return pa.Table.from_arrays(arrays, schema=SCHEMA)
+
+
+def free_time(station: FloatArray, speed: FloatArray, setting: Setting, law: Acc) -> FloatArray:
+    """Time [s] to reach station `GOAL` by free driving in steps of dt, the crossing interpolated; 0 if past it."""
+    station, speed = station.copy(), speed.copy()
+    time = np.zeros(len(station))
+    under_way = station < GOAL
+    while under_way.any():
+        faster = np.maximum(speed + law.clip(law.free(speed, setting.speed_limit)) * setting.dt, 0.0)
+        speed = np.where(under_way, faster, speed)
+        step = speed * setting.dt
+        part = np.clip(np.divide(GOAL - station, step, out=np.ones_like(step), where=step > 0), 0.0, 1.0)
+        time += np.where(under_way, part * setting.dt, 0.0)
+        station = np.where(under_way, station + step, station)
+        under_way = station < GOAL
+    return time
+
+
+def _delay(c: dict[str, AnyArray], encounters: Encounters, setting: Setting, law: Acc) -> FloatArray:
+    rest = free_time(c["end_station"], c["end_speed"], setting, law)
+    arrival = np.where(np.isnan(c["goal_s"]), c["end_cycle"] * setting.dt + rest, c["goal_s"])
+    delay: FloatArray = arrival - free_time(encounters.host_station, encounters.host_speed, setting, law)
+    return delay
+
+
+def _earlier(first: FloatArray, second: FloatArray) -> BoolArray:
+    return np.nan_to_num(first, nan=np.inf) < np.nan_to_num(second, nan=np.inf)
+
+
+def _masked(values: BoolArray, known: BoolArray) -> pa.Array:
+    return pa.array(values, pa.bool_(), mask=~known)
+
+
+def _finite(values: FloatArray) -> pa.Array:
+    return pa.array(values, pa.float64(), mask=~np.isfinite(values))

@@ -1,0 +1,166 @@
+"""Scenario files: a ramp, a source of encounters, and how the merging car drives."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
+
+from merge_cosim.cosim.scoring import Rules
+from merge_cosim.errors import UserError
+from merge_cosim.files import shipped
+from merge_cosim.ngsim.rules import PairRules
+from merge_cosim.registry import did_you_mean
+from merge_cosim.traffic.base import MergingCar, merging_cars
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class Span(_Strict):
+    """Evenly spaced values, both ends included."""
+
+    first: float = Field(alias="from")
+    last: float = Field(alias="to")
+    step: PositiveFloat
+
+    def values(self) -> list[float]:
+        """All values, in order."""
+        return [self.first + i * self.step for i in range(round((self.last - self.first) / self.step) + 1)]
+
+
+class Grid(_Strict):
+    """Every combination of initial states (Designed Test II).
+
+    Attributes:
+        merging_station: The merging car's initial station [m].
+        host_offset: The host's initial station minus the merging car's [m]; positive is ahead.
+        host_speed: The host's initial speeds [m/s].
+        merging_speed: The merging car's initial speeds [m/s].
+        length: Length of both cars [m].
+    """
+
+    kind: Literal["grid"]
+    merging_station: Annotated[float, Field(lt=0)] = -90.0
+    host_offset: Span
+    host_speed: Span
+    merging_speed: Span
+    length: PositiveFloat = 5.0
+
+
+class Pairs(_Strict):
+    """Logged pairs of NGSIM, or of the surrogate.
+
+    Attributes:
+        sites: Which part of which site: `train`, `test` or `all`.
+        split: `car`: all pairs of a merging car are on one side; `pair`: as the papers split.
+        fraction: Share to train on.
+        seed: Seed of the split.
+        merge_point: `car`: station 0 is each logged lane change; `site`: the site's median, which tells an estimator
+            nothing about the future.
+        rules: How cars become pairs.
+    """
+
+    kind: Literal["pairs"]
+    sites: dict[Literal["us101", "i80"], Literal["train", "test", "all"]]
+    split: Literal["car", "pair"] = "car"
+    fraction: Annotated[float, Field(gt=0, lt=1)] = 1 / 3
+    seed: int = 0
+    merge_point: Literal["car", "site"] = "car"
+    rules: PairRules = PairRules()
+
+
+class Scenario(_Strict):
+    """A test: where, from which states, against whom, and how it is scored.
+
+    Attributes:
+        title: One line for tables.
+        about: What the test is, for the reader.
+        ramp: Name or folder of the ramp.
+        encounters: Where the initial states come from.
+        merging: The merging car's `model` and its parameters.
+        test: How an encounter is scored.
+        speed_limit: Speed limit [m/s]; the ramp's own if not given.
+        name: Name of the scenario, that of its file.
+    """
+
+    title: str
+    about: str = ""
+    ramp: str
+    encounters: Annotated[Grid | Pairs, Field(discriminator="kind")]
+    merging: dict[str, Any]
+    test: Rules = Rules()
+    speed_limit: PositiveFloat | None = None
+    name: str
+
+    def merging_car(self) -> MergingCar:
+        """Make the merging car.
+
+        Raises:
+            UserError: There is no such model or parameter.
+        """
+        values = dict(self.merging)
+        return merging_cars.build(str(values.pop("model", "")), values, f"scenario {self.name}, [merging]")
+
+    @property
+    def is_replay(self) -> bool:
+        """The merging car drives as logged, so the log's order is a label."""
+        return self.merging.get("model") == "replay"
+
+
+SECTIONS = tuple(Scenario.model_fields)
+
+
+def scenario_names() -> list[str]:
+    """Names of the shipped scenarios."""
+    return sorted(file.stem for file in shipped("scenarios").glob("*.toml"))
+
+
+def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) -> Scenario:
+    """Read a shipped scenario by name, or any by file, with some values set otherwise (`test.horizon`, `ramp`, ...).
+
+    Raises:
+        UserError: There is no such scenario, or a key or value in it is wrong.
+    """
+    file = shipped("scenarios") / f"{name_or_file}.toml"
+    if not file.is_file():
+        file = Path(name_or_file)
+    if not file.is_file():
+        if file.suffix:
+            raise UserError(f"{file}: no such scenario file")
+        raise UserError(f"unknown scenario '{name_or_file}'{did_you_mean(name_or_file, scenario_names())}")
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{file}: not a TOML file: {error}") from None
+    for name, value in (settings or {}).items():
+        _set(document, name, value)
+    try:
+        scenario = Scenario.model_validate({"name": file.stem, **document})
+    except ValidationError as error:
+        raise UserError(f"{file}: {_first_problem(error)}") from None
+    scenario.merging_car()
+    return scenario
+
+
+def _set(document: dict[str, Any], name: str, value: Any) -> None:
+    *parents, last = name.split(".")
+    for parent in parents:
+        document = document.setdefault(parent, {})
+    document[last] = value
+
+
+def _first_problem(error: ValidationError) -> str:
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"] if part not in ("grid", "pairs"))
+    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        model = {"encounters": (Grid, Pairs)}.get(str(first["loc"][0]), (Scenario,))
+        known = sorted({name for one in model for name in one.model_fields})
+        return f"unknown key '{key}'{did_you_mean(key.rsplit('.', 1)[-1], known)}"
+    if first["type"] == "missing":
+        return f"the key '{key}' is missing"
+    return f"{key} = {first['input']!r}: {first['msg']}"

@@ -1,0 +1,78 @@
+"""One case alone: the same outcome as in a sweep, with every cycle recorded, or shown in sumo-gui."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from merge_cosim.cosim.plant import SumoPlant
+from merge_cosim.cosim.session import Session, SumoOptions, TraciSession
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.sweep import SweepRequest, plan
+from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.registry import did_you_mean
+
+
+def run_single(
+    request: SweepRequest, case: str, gui_delay: int | None = None, trace: Path | None = None
+) -> dict[str, Any]:
+    """Run one case of one scenario under one method.
+
+    Args:
+        request: Names one scenario and one method.
+        case: Name of the case.
+        gui_delay: Milliseconds per step in sumo-gui; None runs without a window.
+        trace: File for the cycle-by-cycle record (.csv or .parquet), or None.
+
+    Returns:
+        The result row.
+
+    Raises:
+        UserError: There is no such case, or the trace's file name has another ending.
+    """
+    if trace is not None and trace.suffix not in (".csv", ".parquet"):
+        raise UserError(f"{trace}: --trace writes .csv or .parquet")
+    batch = _case_alone(plan(request), case)
+    row, record = trace_case(batch, gui_delay)
+    if trace is not None:
+        trace.parent.mkdir(parents=True, exist_ok=True)
+        if trace.suffix == ".csv":
+            record.to_csv(trace, index=False)
+        else:
+            record.to_parquet(trace, index=False)
+    return row
+
+
+def trace_case(batch: Batch, gui_delay: int | None = None) -> tuple[dict[str, Any], pd.DataFrame]:
+    """Run a batch of one and return its result row and its record, one row per cycle."""
+    ramp = Ramp.load(batch.scenario.ramp)
+
+    def open_gui(options: SumoOptions) -> Session:
+        return TraciSession(options, gui=True)
+
+    if gui_delay is None:
+        plant = SumoPlant(ramp, 1, batch.seed)
+    else:
+        plant = SumoPlant(ramp, 1, batch.seed, open_gui, ("--start", "--delay", str(gui_delay)))
+    try:
+        run = simulate_batch(batch, plant, ramp, traced=(0,))
+    finally:
+        plant.close()
+    return rows_of(batch, run, ramp).to_pylist()[0], pd.DataFrame(run.traces[0])
+
+
+def _case_alone(batches: Sequence[Batch], case: str) -> Batch:
+    for batch in batches:
+        found = np.flatnonzero(batch.encounters.case == case)
+        if len(found):
+            return Batch(
+                batch.scenario, batch.variation, batch.method, batch.model, batch.encounters.take(found[:1]), batch.seed
+            )
+    names = [str(name) for batch in batches for name in batch.encounters.case]
+    few = did_you_mean(case, names) if len(names) <= 12 else f" (such as {names[0]}, {names[-1]})"
+    raise UserError(f"scenario {batches[0].scenario.name}: no case '{case}'{few}")
