@@ -88,7 +88,7 @@ def did_you_mean(name: str, choices: Mapping[str, Any] | list[str]) -> str:
     """The tail of a message about an unknown name: the nearest choice, and all of them."""
     near = get_close_matches(name, list(choices), n=1)
     hint = f"; did you mean '{near[0]}'?" if near else ""
-    return f"{hint} (choose from: {', '.join(sorted(choices))})"
+    return f"{hint} (choose from: {', '.join(sorted(set(choices))) or 'none'})"
 
 
 def parameters(cls: type) -> dict[str, Any]:

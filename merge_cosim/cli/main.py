@@ -51,7 +51,7 @@ def sweep(
     seed: Seed = 0,
     plugin: Plugins = None,
     out: Annotated[Path, typer.Option(help="Result folder.")] = Path("out"),
-    jobs: Annotated[int, typer.Option(min=1, help="Processes; one per core if not given.")] = 0,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Finish an interrupted sweep.")] = False,
     json: Json = False,
 ) -> None:

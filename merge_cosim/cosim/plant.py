@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from merge_cosim.cosim.session import Car, LibsumoSession, Session, SumoOptions
 from merge_cosim.encounter import Encounters
-from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.ramps.tiles import tile_id, tile_net
 from merge_cosim.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
 
@@ -119,7 +119,7 @@ class SumoPlant:
                 encounters.merging_length[case],
             )
 
-    def _place(self, row: int, path: Literal["main", "ramp"], station: float, speed: float, length: float) -> None:
+    def _place(self, row: int, path: Way, station: float, speed: float, length: float) -> None:
         name, tile = self._names[row], row % self.count
         where = self.ramp.place(path, float(station), float(self._merge_position[row]))
         self.session.place(name, tile_id(tile, f"{where.edge}_{where.lane}"), where.position, float(speed))

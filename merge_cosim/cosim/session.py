@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -16,6 +17,7 @@ SPEED_MODE_UNCHECKED = 32
 """SUMO drives the commanded speed exactly: no safe-speed, right-of-way or acceleration check."""
 LANE_CHANGE_MODE_NONE = 0
 """SUMO changes no lane by itself."""
+_VIEW, _ZOOM = "View #0", 1500.0
 
 
 @dataclass(frozen=True)
@@ -193,8 +195,17 @@ class TraciSession(_ApiSession):
             raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
         errors = (traci.TraCIException, traci.FatalTraCIError)
         super().__init__(traci, traci.vehicle.setSpeed, errors)
-        binary = sumolib.checkBinary("sumo-gui" if gui else "sumo")
-        _open(lambda: traci.start([binary, *options.arguments()], stdout=sys.stderr), options, errors)
+        command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *options.arguments()]
+        if gui:
+            command += ["--start", "--quit-on-end", "--window-size", "1200,500"]
+        with redirect_stdout(sys.stderr):  # traci prints its attempts to connect
+            _open(lambda: traci.start(command, stdout=sys.stderr), options, errors)
+
+    def follow(self, car: str) -> None:
+        """Let the view of sumo-gui follow a car."""
+        self._api.gui.setSchema(_VIEW, "real world")
+        self._api.gui.trackVehicle(_VIEW, car)
+        self._api.gui.setZoom(_VIEW, _ZOOM)
 
 
 def _open(start: Callable[[], object], options: SumoOptions, errors: tuple[type[Exception], ...]) -> None:

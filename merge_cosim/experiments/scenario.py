@@ -13,7 +13,7 @@ from merge_cosim.cosim.scoring import Rules
 from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
 from merge_cosim.ngsim.rules import PairRules
-from merge_cosim.registry import did_you_mean
+from merge_cosim.registry import did_you_mean, parameters
 from merge_cosim.traffic.base import MergingCar, merging_cars
 
 
@@ -112,7 +112,8 @@ class Scenario(_Strict):
         return self.merging.get("model") == "replay"
 
 
-SECTIONS = tuple(Scenario.model_fields)
+SECTIONS = ("ramp", "encounters", "merging", "test", "speed_limit")
+"""What of a scenario can be set or varied from the command line."""
 
 
 def scenario_names() -> list[str]:
@@ -151,16 +152,28 @@ def _set(document: dict[str, Any], name: str, value: Any) -> None:
     *parents, last = name.split(".")
     for parent in parents:
         document = document.setdefault(parent, {})
+        if not isinstance(document, dict):
+            raise UserError(f"{name}: '{parent}' is a value, it has no parts")
     document[last] = value
+
+
+_KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules]] = {
+    (): Scenario,
+    ("encounters", "grid"): Grid,
+    ("encounters", "pairs"): Pairs,
+    ("encounters", "pairs", "rules"): PairRules,
+    ("test",): Rules,
+}
 
 
 def _first_problem(error: ValidationError) -> str:
     first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"] if part not in ("grid", "pairs"))
+    *place, key = first["loc"]
+    shown = ".".join(str(part) for part in first["loc"] if part not in ("grid", "pairs", "[key]"))
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        model = {"encounters": (Grid, Pairs)}.get(str(first["loc"][0]), (Scenario,))
-        known = sorted({name for one in model for name in one.model_fields})
-        return f"unknown key '{key}'{did_you_mean(key.rsplit('.', 1)[-1], known)}"
+        section = _KNOWN.get(tuple(str(part) for part in place), Span)
+        known = section.model_fields if issubclass(section, BaseModel) else parameters(section)
+        return f"unknown key '{shown}'{did_you_mean(str(key), list(known))}"
     if first["type"] == "missing":
-        return f"the key '{key}' is missing"
-    return f"{key} = {first['input']!r}: {first['msg']}"
+        return f"the key '{shown}' is missing"
+    return f"{shown} = {first['input']!r}: {first['msg']}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from merge_cosim.errors import UserError
 from merge_cosim.experiments.sweep import SweepRequest, plan
 from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.tiles import tile_id
 from merge_cosim.registry import did_you_mean
 
 
@@ -52,18 +55,23 @@ def trace_case(batch: Batch, gui_delay: int | None = None) -> tuple[dict[str, An
     """Run a batch of one and return its result row and its record, one row per cycle."""
     ramp = Ramp.load(batch.scenario.ramp)
 
-    def open_gui(options: SumoOptions) -> Session:
-        return TraciSession(options, gui=True)
-
     if gui_delay is None:
         plant = SumoPlant(ramp, 1, batch.seed)
     else:
-        plant = SumoPlant(ramp, 1, batch.seed, open_gui, ("--start", "--delay", str(gui_delay)))
+        plant = SumoPlant(ramp, 1, batch.seed, _open_window, ("--delay", str(gui_delay)))
     try:
+        if isinstance(plant.session, TraciSession):
+            plant.session.follow(tile_id(0, "host"))
         run = simulate_batch(batch, plant, ramp, traced=(0,))
     finally:
         plant.close()
     return rows_of(batch, run, ramp).to_pylist()[0], pd.DataFrame(run.traces[0])
+
+
+def _open_window(options: SumoOptions) -> Session:
+    if "DISPLAY" not in os.environ and sys.platform.startswith("linux"):
+        raise UserError("--gui: there is no display (DISPLAY is not set); leave it out, or use xvfb-run")
+    return TraciSession(options, gui=True)
 
 
 def _case_alone(batches: Sequence[Batch], case: str) -> Batch:

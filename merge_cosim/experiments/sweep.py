@@ -115,7 +115,7 @@ def _methods(names: Sequence[str], settings: dict[str, Any]) -> list[Method]:
 def _scenario_batches(
     scenario: Scenario, variation: str, methods: list[Method], encounters: Encounters, request: SweepRequest
 ) -> Iterator[Batch]:
-    Ramp.load(scenario.ramp)
+    encounters, left_out = _on_the_ramp(scenario, encounters)
     for source in np.unique(encounters.source):
         chosen = encounters.take(np.flatnonzero(encounters.source == source))
         for method in methods_for(chosen, methods):
@@ -123,7 +123,18 @@ def _scenario_batches(
             if model is not None:
                 _refuse_trained(scenario, chosen, model)
                 method.driver(model)
-            yield Batch(scenario, variation, method, model, chosen, request.seed)
+            yield Batch(scenario, variation, method, model, chosen, request.seed, left_out)
+
+
+def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:
+    """The encounters that the ramp has room for, and the names of the others."""
+    ramp = Ramp.load(scenario.ramp)
+    fits = ramp.holds(encounters.merge_position, encounters.host_station, encounters.merging_station)
+    if not fits.any():
+        merge_position = float(encounters.merge_position[0])
+        ramp.place("main", float(encounters.host_station[0]), merge_position)
+        ramp.place("ramp", float(encounters.merging_station[0]), merge_position)
+    return encounters.take(np.flatnonzero(fits)), tuple(encounters.case[~fits].tolist())
 
 
 def default_model(source: str) -> str:
@@ -181,6 +192,7 @@ def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Prog
         "scenarios": {
             batch.scenario.name: batch.scenario.model_dump(mode="json") for batch in batches if not batch.variation
         },
+        "left_out": {batch.scenario.name: list(batch.left_out) for batch in batches if batch.left_out},
         "command": {"jobs": request.jobs, "resumed": resume},
         "wall_s": round(perf_counter() - begin, 3),
         "loop_wall_s": round(loop_s, 3),

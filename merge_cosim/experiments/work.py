@@ -34,6 +34,7 @@ class Batch:
         model: Its learned model, if it needs one.
         encounters: The cases.
         seed: SUMO's seed.
+        left_out: Names of cases of the scenario that do not fit on its ramp.
     """
 
     scenario: Scenario
@@ -42,6 +43,7 @@ class Batch:
     model: IntentionModel | None
     encounters: Encounters
     seed: int = 0
+    left_out: tuple[str, ...] = ()
 
     @property
     def names(self) -> dict[str, str]:

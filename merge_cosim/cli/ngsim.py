@@ -1,0 +1,113 @@
+"""`merge-cosim ngsim`: NGSIM trajectories in, canonical tables out."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Import, fetch, look at and imitate NGSIM trajectories.", no_args_is_help=True)
+
+Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="NGSIM files: text, CSV or Parquet.")]
+OptionalSite = Annotated[
+    str | None,
+    typer.Option("--site", help="Keep only this site (us101, i80); also the site of a file that does not tell it."),
+]
+Out = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+
+
+@app.command("import")
+def import_(files: Files, out: Out, site: OptionalSite = None, as_json: Json = False) -> None:
+    """Write NGSIM files of any format as canonical Parquet, one file per site."""
+    import json
+    from dataclasses import asdict
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from merge_cosim.ngsim.convert import convert
+    from merge_cosim.ngsim.sites import site as find_site
+
+    done = convert(files, out, find_site(site) if site else None)
+    if as_json:
+        print(json.dumps(asdict(done), default=str, indent=2))
+        return
+    table = Table("site", "recording")
+    for name in ("rows", "cars"):
+        table.add_column(name, justify="right")
+    for row in done.recordings:
+        table.add_row(row.site, row.recording, f"{row.rows:,}", f"{row.cars:,}")
+    console = Console()
+    console.print(table)
+    repeats = f"{done.repeats.dropped:,} repeated rows dropped"
+    if done.repeats.conflicting:
+        repeats += f" ({done.repeats.conflicting:,} of them at another position: the first was kept)"
+    console.print(f"{done.rows:,} rows read, {done.kept:,} kept, {repeats}")
+    for name, rows in done.elsewhere.items():
+        console.print(f"{rows:,} rows passed over: {name}")
+    for path in done.written.values():
+        console.print(f"wrote {path}", soft_wrap=True)
+
+
+@app.command("download")
+def download_(
+    out: Out,
+    url: Annotated[str | None, typer.Option("--url", help="Another address than the portal's.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Fetch all NGSIM trajectories (about 1.4 GB) from the US Department of Transportation."""
+    import json
+
+    from rich.console import Console
+    from rich.progress import BarColumn, DownloadColumn, Progress, TimeRemainingColumn, TransferSpeedColumn
+
+    from merge_cosim.ngsim.download import PORTAL, download
+
+    console = Console(stderr=True)
+    columns = (BarColumn(), DownloadColumn(), TransferSpeedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("download", total=None)
+        path = download(out, url or PORTAL, lambda done, total: bar.update(task, completed=done, total=total))
+    print(json.dumps({"file": str(path), "bytes": path.stat().st_size}) if as_json else f"wrote {path}")
+
+
+@app.command("summary")
+def summary(
+    data: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with NGSIM files, or one such file.")],
+    as_json: Json = False,
+) -> None:
+    """Show the encounters that a data folder holds, beside the papers' Table I, and what was rejected."""
+    import json
+    from math import nan
+
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    from merge_cosim.ngsim.summary import summarise_folder
+
+    summaries = summarise_folder(data)
+    if as_json:
+        print(json.dumps([each.as_dict() for each in summaries], indent=2))
+        return
+    table = Table("site", *(Column(name, justify="right") for name in ("pairs", "L_merge", "speed", "yielding")))
+    for each in summaries:
+        figures = (f"{each.merge_distance_m:.1f} m", f"{each.speed_m_s:.1f} m/s", f"{100 * each.yielding:.0f} %")
+        table.add_row(each.site, str(each.pairs), *figures)
+        if paper := each.published:
+            table.add_row("  published", str(paper.pairs), f"{paper.merge_distance_m} m", f"{paper.speed_m_s} m/s", "")
+    console = Console()
+    console.print(table)
+    for each in summaries:
+        shortest, median, longest = each.window_s or (nan, nan, nan)
+        lines = {
+            "merging cars": f"{each.cars} in pairs, of {each.merging_cars}",
+            "windows": f"{shortest:.1f} to {longest:.1f} s, median {median:.1f} s",
+            "logs": f"{each.complete} scored to the end, {each.cut} cut by a lane change, {each.extended} extended",
+            "flagged": f"{each.smoothed_source} smoothed at the source, {each.length_missing} without a length, "
+            f"{each.host_past_start} with the host past the merging point at the start",
+            "rejected": ", ".join(f"{count} {why}" for why, count in each.rejected.items()) or "none",
+            "logged host fails": ", ".join(each.logged_host_failures) or "in no pair",
+        }
+        console.print(f"{each.site} ({each.source})")
+        for name, text in lines.items():
+            console.print(f"  {name}: {text}", soft_wrap=True)

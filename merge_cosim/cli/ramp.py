@@ -1,0 +1,97 @@
+"""`merge-cosim ramp`: list, check, build, edit and start ramps."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    help="List, check, build and edit ramps: folders with ramp.toml and a SUMO net.", no_args_is_help=True
+)
+
+Which = Annotated[str, typer.Argument(metavar="NAME|DIR", help="A shipped ramp's name or a ramp's folder.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+
+
+@app.command("list")
+def list_(as_json: Json = False) -> None:
+    """Show the shipped ramps."""
+    import json
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from merge_cosim.ramps.ramp import Ramp, ramp_names
+
+    ramps = [Ramp.load(name) for name in ramp_names()]
+    if as_json:
+        print(json.dumps([ramp.summary() for ramp in ramps], indent=2))
+        return
+    table = Table("ramp", "title", caption="in metres past the gore; limit in m/s")
+    for column in ("merge at", "extra lane to", "from", "to", "limit"):
+        table.add_column(column, justify="right")
+    for ramp in ramps:
+        lane = f"{ramp.auxiliary_end:.0f}" if ramp.changes_lane else "none"
+        numbers = (-ramp.upstream, ramp.downstream, ramp.speed_limit)
+        table.add_row(
+            ramp.name, ramp.title, f"{ramp.merging_point:.0f}", lane, *(f"{number:.0f}" for number in numbers)
+        )
+    Console().print(table)
+
+
+@app.command("check")
+def check_(which: Which, as_json: Json = False) -> None:
+    """Say what is wrong with a ramp; exit status 1 if anything is."""
+    import json
+
+    from merge_cosim.ramps.build import check
+    from merge_cosim.ramps.ramp import find_ramp
+
+    folder = find_ramp(which)
+    problems = check(folder)
+    if as_json:
+        print(json.dumps({"folder": str(folder), "problems": problems}, indent=2))
+    else:
+        print("\n".join(problems) if problems else f"{folder}: no problem found")
+    if problems:
+        raise typer.Exit(1)
+
+
+@app.command("build")
+def build_(which: Which) -> None:
+    """Build a ramp's net from its plain XML sources with netconvert."""
+    from merge_cosim.ramps.build import build, check
+    from merge_cosim.ramps.ramp import find_ramp
+
+    folder = find_ramp(which)
+    print(f"wrote {build(folder)}")
+    problems = check(folder)
+    if problems:
+        print("\n".join(problems))
+        raise typer.Exit(1)
+
+
+@app.command("edit")
+def edit(which: Which) -> None:
+    """Open a ramp's plain XML sources in netedit, SUMO's editor, and wait until it is closed."""
+    from merge_cosim.ramps.edit import open_editor
+    from merge_cosim.ramps.ramp import find_ramp
+
+    open_editor(find_ramp(which), print)
+
+
+@app.command("new")
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The new ramp's name.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder in which the ramp's folder is made.")],
+    upstream: Annotated[float, typer.Option(min=1.0, help="Road and on-ramp before the gore [m].")] = 500.0,
+    downstream: Annotated[float, typer.Option(min=1.0, help="Road after the gore [m].")] = 1500.0,
+    speed_limit: Annotated[float, typer.Option(min=1.0, help="Speed limit [m/s].")] = 29.0,
+) -> None:
+    """Start a ramp of your own from a copy of the designed one."""
+    from merge_cosim.ramps.build import check
+    from merge_cosim.ramps.new import new_ramp
+
+    folder = new_ramp(out / name, upstream, downstream, speed_limit)
+    print("\n".join([f"wrote {folder}", *check(folder)]))
+    print(f"Change it with: merge-cosim ramp edit {folder}")

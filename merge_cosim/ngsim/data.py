@@ -1,0 +1,155 @@
+"""The user's data: where it is, what each file holds, and the trajectories of a site, cached."""
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from merge_cosim.errors import UserError
+from merge_cosim.files import cache_folder
+from merge_cosim.ngsim.download import UNFINISHED
+from merge_cosim.ngsim.formats import Kind, sources
+from merge_cosim.ngsim.read import Reading, merge, read_file
+from merge_cosim.ngsim.sites import Site, site
+from merge_cosim.ngsim.table import Repeats
+
+READER_VERSION = 1
+"""Raised when the same file would be read differently, so that cached tables are made anew."""
+
+ENVIRONMENT = "MERGE_COSIM_DATA"
+"""Environment variable that names the data folder."""
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """One file in a data folder.
+
+    Attributes:
+        path: The file.
+        kind: What it holds; of a zip archive, trajectories if any member does.
+        note: Why it is passed over, else empty.
+    """
+
+    path: Path
+    kind: Kind
+    note: str = ""
+
+
+def find_data(option: Path | None) -> Path | None:
+    """Return the data folder (or file): the option, else `$MERGE_COSIM_DATA`, else `./data`, else None.
+
+    Raises:
+        UserError: What the option or the variable names does not exist.
+    """
+    if option is not None:
+        if not option.exists():
+            raise UserError(f"{option}: no such folder (from --data)")
+        return option
+    if named := os.environ.get(ENVIRONMENT):
+        if not Path(named).exists():
+            raise UserError(f"{named}: no such folder (from ${ENVIRONMENT})")
+        return Path(named)
+    return Path("data") if Path("data").is_dir() else None
+
+
+def data_files(data: Path) -> list[DataFile]:
+    """Look into every file of a data folder (or at the one file named), sorted by path.
+
+    Raises:
+        UserError: A file is damaged.
+    """
+    if data.is_file():
+        return [_look(data)]
+    paths = (path for path in data.rglob("*") if path.is_file())
+    return [_look(path) for path in sorted(paths) if not any(p.startswith(".") for p in path.relative_to(data).parts)]
+
+
+def episode_files(data: Path) -> list[Path]:
+    """Return the files of a data folder that hold merging episodes."""
+    return [file.path for file in data_files(data) if file.kind is Kind.EPISODES]
+
+
+def load_trajectories(data: Path | Iterable[Path], wanted: str | Site) -> pa.Table | None:
+    """Return the canonical table (`table.SCHEMA`) of one site.
+
+    Args:
+        data: A data folder, whose other files are passed over; or files, which must hold trajectories of the site
+            (those with episodes excepted: they are read elsewhere).
+        wanted: The site or its name.
+
+    Returns:
+        The rows of all files, or None where there are none of this site.
+
+    Raises:
+        UserError: A file is damaged, or a named one holds no row of the site.
+    """
+    wanted = site(wanted) if isinstance(wanted, str) else wanted
+    if isinstance(data, Path) and data.is_dir():
+        paths = [file.path for file in data_files(data) if file.kind is Kind.TRAJECTORIES]
+        readings = [cached(path) for path in paths]
+    else:
+        named = [data] if isinstance(data, Path) else list(data)
+        paths = [path for path in named if _look(path).kind is not Kind.EPISODES]
+        readings = [cached(path) for path in paths]
+        for path, reading in zip(paths, readings, strict=True):
+            if wanted.name not in reading.tables:
+                raise UserError(f"{path}: no row of {wanted.name} (it has {reading.holds})")
+    held = [Reading({wanted.name: r.tables[wanted.name]}) for r in readings if wanted.name in r.tables]
+    if not held:
+        return None
+    return held[0].tables[wanted.name] if len(held) == 1 else merge(held).tables[wanted.name]
+
+
+def cached(path: Path) -> Reading:
+    """Read a trajectory file, or take its tables from the cache if it was read before and has not changed."""
+    try:
+        state = path.resolve().stat()
+    except OSError:
+        return read_file(path)
+    key = f"{path.resolve()}|{state.st_size}|{state.st_mtime_ns}|{READER_VERSION}"
+    folder = cache_folder("ngsim") / hashlib.sha256(key.encode()).hexdigest()[:16]
+    if not (folder / "reading.json").is_file():
+        reading = read_file(path)
+        _store(reading, folder)
+        return reading
+    facts = json.loads((folder / "reading.json").read_text())
+    tables = {name: pq.read_table(folder / f"{name}.parquet") for name in facts["sites"]}
+    return Reading(tables, facts["rows"], Counter(facts["elsewhere"]), Repeats(**facts["repeats"]))
+
+
+def _store(reading: Reading, folder: Path) -> None:
+    """Write a reading beside its place and move it there, so that no other process ever sees half of it."""
+    made = Path(tempfile.mkdtemp(dir=folder.parent))
+    for name, table in reading.tables.items():
+        pq.write_table(table, made / f"{name}.parquet")
+    facts = {
+        "sites": list(reading.tables),
+        "rows": reading.rows,
+        "elsewhere": reading.elsewhere,
+        "repeats": {"dropped": reading.repeats.dropped, "conflicting": reading.repeats.conflicting},
+    }
+    (made / "reading.json").write_text(json.dumps(facts))
+    try:
+        made.rename(folder)
+    except OSError:
+        shutil.rmtree(made)  # another process was faster
+
+
+def _look(path: Path) -> DataFile:
+    if path.suffix == UNFINISHED:
+        return DataFile(path, Kind.OTHER, "an unfinished download")
+    found = sources(path)
+    kinds = [source.kind for source in found]
+    if Kind.TRAJECTORIES in kinds:
+        return DataFile(path, Kind.TRAJECTORIES)
+    if not found:
+        return DataFile(path, Kind.OTHER, "it is empty")
+    return DataFile(path, found[0].kind, found[0].note)

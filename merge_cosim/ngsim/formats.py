@@ -1,0 +1,225 @@
+"""Telling NGSIM files apart by their content: what a file holds, which columns, and how to open it."""
+
+import csv
+import gzip
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import BinaryIO, cast
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from merge_cosim.errors import UserError
+from merge_cosim.units import FOOT
+
+TEXT_COLUMNS = (
+    "Vehicle_ID",
+    "Frame_ID",
+    "Total_Frames",
+    "Global_Time",
+    "Local_X",
+    "Local_Y",
+    "Global_X",
+    "Global_Y",
+    "v_Length",
+    "v_Width",
+    "v_Class",
+    "v_Vel",
+    "v_Acc",
+    "Lane_ID",
+    "Preceding",
+    "Following",
+    "Space_Headway",
+    "Time_Headway",
+)
+"""Columns of the original text files, which have no header."""
+
+MAX_MISSING = 2
+"""A file that lacks at most so many of a layout's required columns is meant to be of that layout."""
+
+_MAX_HEADER = 1 << 16
+_UNDECODED = "\ufffd"
+_PARQUET, _ZIP, _GZIP = b"PAR1", b"PK\x03\x04", b"\x1f\x8b"
+_EPISODES = {"episode", "frame", "car", "station_m", "speed_m_s"}
+
+
+class Kind(StrEnum):
+    """What a file holds."""
+
+    TRAJECTORIES = "trajectories"
+    EPISODES = "merging episodes"
+    NO_CLOCK = "no clock"
+    OTHER = "other"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a format names the canonical columns, and its unit of length.
+
+    Attributes:
+        numbers: The format's name of each canonical column of numbers; matched without regard to case.
+        recording: Its name of the column that names the recording, if it has one.
+        unit: Metres per unit of length.
+    """
+
+    numbers: dict[str, str]
+    recording: str
+    unit: float
+
+
+REQUIRED = ("vehicle_id", "frame", "x", "y", "speed", "lane")
+"""Canonical columns that every trajectory file has, beside what tells the site and the recording."""
+
+NGSIM = Layout(
+    {
+        "vehicle_id": "Vehicle_ID",
+        "part": "track_part",
+        "frame": "Frame_ID",
+        "x": "Local_X",
+        "y": "Local_Y",
+        "speed": "v_Vel",
+        "length": "v_Length",
+        "width": "v_Width",
+        "lane": "Lane_ID",
+    },
+    recording="segment",
+    unit=FOOT,
+)
+"""The published files and what keeps their names."""
+
+OWN = Layout({name: name for name in NGSIM.numbers}, recording="recording", unit=1.0)
+"""The canonical table."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file, or one member of a zip archive, and what its beginning tells.
+
+    Attributes:
+        path: The file.
+        kind: What it holds.
+        layout: Its names and unit, where it holds trajectories.
+        columns: Its columns as it spells them.
+        parquet: Parquet, else text.
+        header: A text's first line names the columns.
+        blanks: A text's columns are separated by blanks, else by commas.
+        member: Name in the zip archive.
+        note: Why it is not trajectory data.
+    """
+
+    path: Path
+    kind: Kind
+    layout: Layout = NGSIM
+    columns: tuple[str, ...] = ()
+    parquet: bool = False
+    header: bool = True
+    blanks: bool = False
+    member: str = ""
+    note: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.member}" if self.member else str(self.path)
+
+    def find(self, name: str) -> str | None:
+        """Return the file's own spelling of a column, or None where it lacks it."""
+        return next((column for column in self.columns if column.lower() == name.lower()), None)
+
+
+def sources(path: Path) -> list[Source]:
+    """Look into a file: one source, or one for each member of a zip archive.
+
+    Raises:
+        UserError: The file is missing, cannot be read or is damaged.
+    """
+    try:
+        with path.open("rb") as file:
+            magic = file.read(4)
+        if magic == _PARQUET:
+            columns = tuple(pq.read_schema(path).names)
+            return [_told(Source(path, Kind.OTHER, columns=columns, parquet=True))]
+        if magic == _ZIP:
+            with zipfile.ZipFile(path) as archive:
+                members = [info.filename for info in archive.infolist() if not info.is_dir()]
+            return [_text(path, member) for member in members]
+    except FileNotFoundError:
+        raise UserError(f"{path}: no such file") from None
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (pa.ArrowInvalid, zipfile.BadZipFile):
+        raise UserError(f"{path}: damaged or cut short: download or copy it again") from None
+    return [_text(path)]
+
+
+@contextmanager
+def open_text(path: Path, member: str = "") -> Iterator[BinaryIO]:
+    """Open a text file for reading, through gzip or out of a zip archive.
+
+    Raises:
+        UserError: The packed data prove damaged while they are read.
+    """
+    try:
+        if member:
+            with zipfile.ZipFile(path) as archive, archive.open(member) as inside:
+                yield cast(BinaryIO, inside)
+            return
+        with path.open("rb") as file:
+            packed = file.read(2) == _GZIP
+            file.seek(0)
+            yield cast(BinaryIO, gzip.GzipFile(fileobj=file)) if packed else file
+    except (EOFError, gzip.BadGzipFile, zlib.error, zipfile.BadZipFile):
+        raise UserError(f"{path}: damaged or cut short: download or copy it again") from None
+
+
+def missing_columns(source: Source, layout: Layout) -> list[str]:
+    """Return the layout's names of the required columns that a source lacks."""
+    return [layout.numbers[name] for name in REQUIRED if not source.find(layout.numbers[name])]
+
+
+def _text(path: Path, member: str = "") -> Source:
+    """Tell a text by its first line."""
+    with open_text(path, member) as file:
+        line = file.readline(_MAX_HEADER)
+    source = Source(path, Kind.OTHER, member=member)
+    if not line:
+        return replace(source, note="it is empty")
+    text = line.decode("utf-8-sig", errors="replace").strip()
+    if not text.replace("\t", " ").isprintable() or _UNDECODED in text:
+        return replace(source, note="it is not a text")
+    blanks = "," not in text
+    fields = text.split() if blanks else [field.strip() for field in next(csv.reader([text]))]
+    if not all(_is_number(field) for field in fields):
+        return _told(replace(source, columns=tuple(fields), blanks=blanks))
+    if len(fields) == len(TEXT_COLUMNS):
+        return replace(source, kind=Kind.TRAJECTORIES, columns=TEXT_COLUMNS, header=False, blanks=blanks)
+    return replace(source, note=f"it has {len(fields)} columns and no header, NGSIM's text has {len(TEXT_COLUMNS)}")
+
+
+def _told(source: Source) -> Source:
+    """Tell a file by its columns."""
+    if _EPISODES.issubset(source.columns):
+        return replace(source, kind=Kind.EPISODES)
+    if source.find("t_rel") and not source.find("Frame_ID"):
+        return replace(source, kind=Kind.NO_CLOCK, note="its cars stand on no common clock (t_rel), they make no pairs")
+    missing, layout = min(((missing_columns(source, layout), layout) for layout in (NGSIM, OWN)), key=_number_missing)
+    if len(missing) <= MAX_MISSING:
+        return replace(source, kind=Kind.TRAJECTORIES, layout=layout)
+    if len(missing) == len(REQUIRED):
+        return replace(source, note="it has none of the columns of NGSIM")
+    return replace(source, note=f"it lacks the columns {', '.join(missing)}")
+
+
+def _number_missing(choice: tuple[list[str], Layout]) -> int:
+    return len(choice[0])
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field.replace(",", ""))
+    except ValueError:
+        return False
+    return True

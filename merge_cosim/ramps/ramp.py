@@ -1,0 +1,254 @@
+"""A ramp as an encounter sees it: two paths in metres past the gore, and where they lie in the SUMO net.
+
+Coordinates: x [m] runs along the main road and is 0 at the gore; on the on-ramp it is minus the way left to the gore.
+An encounter has its merging point at x = merge_position, and a station is x - merge_position. x is the plain sum of
+edge lengths: junctions have no length, as in SUMO runs without internal links.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+import sumolib
+
+from merge_cosim.errors import UserError
+from merge_cosim.files import shipped
+from merge_cosim.ramps.definition import FILE_NAME, NgsimMapping, RampFile, read_ramp_file
+from merge_cosim.units import BoolArray, FloatArray
+
+Way = Literal["main", "ramp"]
+"""The host's path and the merging car's."""
+
+
+class LanePosition(NamedTuple):
+    """A place in the net: the front bumper at `position` metres from the start of lane `lane` of `edge`."""
+
+    edge: str
+    lane: int
+    position: float
+
+
+@dataclass(frozen=True)
+class Section:
+    """One edge of a path.
+
+    Attributes:
+        edge: Its id.
+        lane: SUMO index of the path's lane on it.
+        start: x of its start [m].
+        length: Its length [m].
+    """
+
+    edge: str
+    lane: int
+    start: float
+    length: float
+
+    @property
+    def end(self) -> float:
+        """X of its end [m]."""
+        return round(self.start + self.length, 9)  # nanometres, so that edges end exactly at the gore
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """A ramp: its net and the two paths through it.
+
+    Attributes:
+        name: Name of its folder.
+        title: One line for lists and reports.
+        net: The built SUMO net.
+        main: The host's path, in driving order.
+        ramp: The merging car's path up to its lane change (or up to the gore, where the ramp joins without one).
+        merging_point: Default merging point [m past the gore].
+        speed_limit: Speed limit [m/s].
+        ngsim: Where NGSIM's lanes lie, if the ramp is one of that data set.
+    """
+
+    name: str
+    title: str
+    net: Path
+    main: tuple[Section, ...]
+    ramp: tuple[Section, ...]
+    merging_point: float
+    speed_limit: float
+    ngsim: NgsimMapping | None = None
+
+    @classmethod
+    def load(cls, name_or_folder: str | Path) -> Ramp:
+        """Load a shipped ramp by its name, or any by the path to its folder.
+
+        Raises:
+            UserError: There is no such ramp, `ramp.toml` is wrong, or the net lacks a named edge or lane.
+        """
+        folder = find_ramp(name_or_folder)
+        return cls.from_file(folder, read_ramp_file(folder))
+
+    @classmethod
+    def from_file(cls, folder: Path, file: RampFile) -> Ramp:
+        """Build a ramp from its definition and the net beside it."""
+        net = read_net(folder / file.net)
+        for problem in missing_lanes(net, file):
+            raise UserError(f"{folder / FILE_NAME}: {problem}")
+        lengths = {edge: float(net.getEdge(edge).getLength()) for edge in file.main + file.ramp}
+        gore = file.main.index(file.gore)
+        own = [edge for edge in file.ramp if edge not in file.main]
+        return cls(
+            name=folder.resolve().name,
+            title=file.title,
+            net=folder / file.net,
+            main=_sections(file.main, file.host_lane, lengths, gore),
+            ramp=_sections(file.ramp, file.merging_lane, lengths, len(own)),
+            merging_point=file.merging_point,
+            speed_limit=file.speed_limit,
+            ngsim=file.ngsim,
+        )
+
+    @property
+    def changes_lane(self) -> bool:
+        """Whether the merging car changes lane at the merging point (else the ramp joins by a connection)."""
+        return self.ramp[-1].end > 0.0
+
+    @property
+    def auxiliary_end(self) -> float:
+        """X where the auxiliary lane ends [m]; inf if there is none."""
+        return self.ramp[-1].end if self.changes_lane else math.inf
+
+    @property
+    def upstream(self) -> float:
+        """Reach upstream of the gore on both paths [m]."""
+        return -max(self.main[0].start, self.ramp[0].start)
+
+    @property
+    def downstream(self) -> float:
+        """Reach downstream of the gore [m]."""
+        return self.main[-1].end
+
+    def summary(self) -> dict[str, str | float | None]:
+        """What a list shows of the ramp, ready for JSON."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "net": str(self.net),
+            "merging_point_m": self.merging_point,
+            "auxiliary_end_m": self.auxiliary_end if self.changes_lane else None,
+            "upstream_m": self.upstream,
+            "downstream_m": self.downstream,
+            "speed_limit_m_s": self.speed_limit,
+        }
+
+    @property
+    def main_route(self) -> tuple[str, ...]:
+        """Edge ids of the host's route."""
+        return tuple(section.edge for section in self.main)
+
+    @property
+    def ramp_route(self) -> tuple[str, ...]:
+        """Edge ids of the merging car's route, which ends where the host's does."""
+        own = tuple(section.edge for section in self.ramp if section.end <= 0.0)
+        return own + tuple(section.edge for section in self.main if section.start >= 0.0)
+
+    def host_lane_on(self, edge: str) -> int:
+        """SUMO index of the host's lane on an edge of the main road."""
+        for section in self.main:
+            if section.edge == edge:
+                return section.lane
+        raise ValueError(f"{self.name}: '{edge}' is no edge of the main road; these are {', '.join(self.main_route)}")
+
+    def holds(self, merge_position: FloatArray, host_station: FloatArray, merging_station: FloatArray) -> BoolArray:
+        """Which encounters fit on the ramp: merging point beside the ramp's lane, both starts on the net; shape (n,)."""
+        beside = (merge_position >= 0.0) & (merge_position <= self.auxiliary_end)
+        start = np.minimum(host_station, merging_station) + merge_position
+        return beside & (start >= -self.upstream) & (host_station + merge_position < self.downstream)
+
+    def place(self, path: Way, station: float, merge_position: float) -> LanePosition:
+        """Where a front bumper at `station` [m] lies in the net.
+
+        On the path `ramp` that is the on-ramp, then the auxiliary lane, and from station 0 on the host lane.
+
+        Raises:
+            UserError: The place or the merging point is off the net; the line names the reach.
+        """
+        x = station + merge_position
+        if not 0.0 <= merge_position <= self.auxiliary_end:
+            raise UserError(
+                f"ramp {self.name}: the merging point {merge_position:.1f} m past the gore is off the auxiliary lane "
+                f"(0 ... {self.auxiliary_end:.1f} m)"
+            )
+        ahead_of_change = path == "ramp" and (x < 0.0 or (station < 0.0 and self.changes_lane))
+        for section in reversed(self.ramp if ahead_of_change else self.main):
+            if section.start <= x <= section.end:
+                return LanePosition(section.edge, section.lane, x - section.start)
+        start = (self.ramp if path == "ramp" else self.main)[0].start
+        raise UserError(
+            f"ramp {self.name}: station {station:.1f} m on the path '{path}' is off the net, which reaches from "
+            f"{start - merge_position:.1f} to {self.downstream - merge_position:.1f} m"
+        )
+
+    def station(self, edge: str, lane: int, position: float, merge_position: float) -> float:
+        """Station [m] of a front bumper `position` metres from the start of any lane of a named edge.
+
+        The inverse of `place`. All lanes of an edge share one coordinate, so `lane` only completes the SUMO place.
+        """
+        for section in self.main + self.ramp:
+            if section.edge == edge:
+                return section.start + position - merge_position
+        named = ", ".join(dict.fromkeys(self.main_route + self.ramp_route))
+        raise ValueError(f"ramp {self.name}: '{edge}' (lane {lane}) is on neither path; these have {named}")
+
+
+def ramp_names() -> list[str]:
+    """Names of the shipped ramps."""
+    return sorted(file.parent.name for file in shipped("sumo_nets").glob(f"*/{FILE_NAME}"))
+
+
+def find_ramp(name_or_folder: str | Path) -> Path:
+    """Folder of a shipped ramp by its name, or of any by its path.
+
+    Raises:
+        UserError: There is neither; the line lists the names.
+    """
+    for folder in (shipped("sumo_nets") / name_or_folder, Path(name_or_folder)):
+        if folder.is_dir() and str(name_or_folder):
+            return folder
+    raise UserError(f"no ramp '{name_or_folder}': give one of {', '.join(ramp_names())}, or a folder with {FILE_NAME}")
+
+
+def _sections(edges: list[str], lanes: list[int], lengths: dict[str, float], before: int) -> tuple[Section, ...]:
+    """Lay edges end to end so that the edge number `before` starts at x = 0."""
+    start = round(-sum(lengths[edge] for edge in edges[:before]), 9)
+    sections = []
+    for edge, lane in zip(edges, lanes, strict=True):
+        sections.append(Section(edge, lane, start, lengths[edge]))
+        start = sections[-1].end
+    return tuple(sections)
+
+
+def missing_lanes(net: sumolib.net.Net, file: RampFile) -> list[str]:
+    """Edges and lanes that a definition names and a net lacks, a line for each that starts with the key."""
+    problems = []
+    for key, edges, lanes in (("main", file.main, file.host_lane), ("ramp", file.ramp, file.merging_lane)):
+        for edge, lane in zip(edges, lanes, strict=True):
+            if not net.hasEdge(edge):
+                problems.append(f"{key}: the net {file.net} has no edge '{edge}'")
+            elif not 0 <= lane < (count := net.getEdge(edge).getLaneNumber()):
+                problems.append(f"{key}: edge '{edge}' has no lane {lane}; its lanes are 0 ... {count - 1}")
+    return problems
+
+
+def read_net(path: Path) -> sumolib.net.Net:
+    """Read a SUMO net.
+
+    Raises:
+        UserError: The file is missing or no net.
+    """
+    if not path.is_file():
+        raise UserError(f"{path}: no such net; build it with: merge-cosim ramp build {path.parent}")
+    try:
+        return sumolib.net.readNet(str(path))
+    except Exception as error:  # sumolib passes on whatever its parser meets
+        raise UserError(f"{path}: not a SUMO net: {error}") from None

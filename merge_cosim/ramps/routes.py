@@ -1,0 +1,95 @@
+"""One encounter as ordinary SUMO files: to be shown in sumo-gui, or kept and changed by hand."""
+
+import shutil
+from pathlib import Path
+
+from lxml import etree
+
+from merge_cosim.encounter import Encounters
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.units import DT
+
+ROLE = "merge-cosim.role"
+"""Parameter of a vehicle type: `host` or `merging`."""
+MERGE_POSITION = "merge-cosim.merge-position"
+"""Parameter of the merging car's type: where its station 0 lies, in m past the gore."""
+
+ZOOM = 600.0
+"""View of sumo-gui on opening [% of the whole net]: some 300 m around the gore."""
+
+COLORS = {"host": "40,160,60", "merging": "210,50,40"}
+"""As in the papers' figures."""
+
+
+def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) -> Path:
+    """Write net, routes and configuration of one encounter into a folder and return the `.sumocfg`.
+
+    Left alone, SUMO drives both cars by its own models; the initial state is the encounter's.
+
+    Raises:
+        UserError: The encounter starts off the net.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(ramp.net, folder / ramp.net.name)
+    merge_position = float(encounters.merge_position[row])
+    states = {
+        "host": (encounters.host_station, encounters.host_speed, encounters.host_length),
+        "merging": (encounters.merging_station, encounters.merging_speed, encounters.merging_length),
+    }
+    types, cars = [], []
+    for role, (station, speed, length) in states.items():
+        where = ramp.place("main" if role == "host" else "ramp", float(station[row]), merge_position)
+        route = ramp.main_route if role == "host" else ramp.ramp_route
+        parameters = {ROLE: role} | ({MERGE_POSITION: _number(merge_position)} if role == "merging" else {})
+        look = {"length": _number(length[row]), "color": COLORS[role]}
+        types.append(
+            _element(
+                "vType",
+                {"id": role, **look, "minGap": "0", "sigma": "0", "speedDev": "0"},
+                *(_element("param", {"key": key, "value": value}) for key, value in parameters.items()),
+            )
+        )
+        start = {
+            "departLane": str(where.lane),
+            "departPos": _number(where.position),
+            "departSpeed": _number(speed[row]),
+        }
+        cars.append(
+            _element(
+                "vehicle",
+                {"id": role, "type": role, "depart": "0", **start, "insertionChecks": "none"},
+                _element("route", {"edges": " ".join(route[route.index(where.edge) :])}),
+            )
+        )
+    _write(folder / "encounter.rou.xml", _element("routes", {}, *types, *cars))
+    view = (
+        _element("scheme", {"name": "real world"}),
+        _element("viewport", {"x": "0", "y": "0", "zoom": _number(ZOOM)}),
+        _element("delay", {"value": "100"}),
+    )
+    _write(folder / "view.xml", _element("viewsettings", {}, *view))
+    options = {
+        "input": {"net-file": ramp.net.name, "route-files": "encounter.rou.xml"},
+        "gui_only": {"gui-settings-file": "view.xml"},
+        "time": {"begin": "0", "step-length": _number(DT)},
+        "processing": {"time-to-teleport": "-1", "collision.action": "warn", "no-internal-links": "true"},
+    }
+    parts = [_element(part, {}, *(_element(k, {"value": v}) for k, v in of.items())) for part, of in options.items()]
+    _write(folder / "encounter.sumocfg", _element("configuration", {}, *parts))
+    return folder / "encounter.sumocfg"
+
+
+def _element(tag: str, attributes: dict[str, str], *children: etree._Element) -> etree._Element:
+    """An XML element with its children."""
+    element = etree.Element(tag, attributes)
+    element.extend(children)
+    return element
+
+
+def _number(value: float) -> str:
+    """A number as XML text, without loss."""
+    return repr(float(value))
+
+
+def _write(path: Path, root: etree._Element) -> None:
+    path.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))

@@ -1,0 +1,68 @@
+"""What all figures share: size, type, and the way into a page."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+WIDTH, HEIGHT = 5.4, 3.4
+"""Size of a single panel [in]: half a page's width on a desk, all of it on a phone."""
+STYLE: Mapping[str, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.6,
+    "svg.hashsalt": "merge-cosim",
+}
+FAILED = "#c1121f"
+"""Colour of failures that no method's colour marks."""
+
+
+def style() -> Any:
+    """Context in which a figure is made."""
+    return mpl.rc_context(dict(STYLE))
+
+
+def panel(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Any]:
+    """Make a figure with one set of axes."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.add_subplot()
+
+
+def grid_of(count: int, across: int, cell: tuple[float, float]) -> tuple[Figure, list[Any]]:
+    """Make small multiples that share their axes; returns the figure and `count` axes, row by row.
+
+    Args:
+        count: Number of small panels.
+        across: Most panels in a row.
+        cell: Width and height of one [in].
+    """
+    across = min(across, count)
+    down = -(-count // across)
+    figure = Figure(figsize=(cell[0] * across, cell[1] * down), layout="constrained")
+    axes = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel().tolist()
+    for spare in axes[count:]:
+        spare.remove()
+    for above in axes[max(count - across, 0) : count]:
+        above.tick_params(labelbottom=True)
+    return figure, axes[:count]
+
+
+def data_uri(figure: Figure) -> str:
+    """The figure as SVG in a data URI, the same bytes for the same figure."""
+    buffer = io.BytesIO()
+    with style():
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()

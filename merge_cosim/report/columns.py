@@ -1,0 +1,86 @@
+"""How columns are headed and their numbers written, in HTML and in LaTeX alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+MISSING = "–"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes:
+        name: Name in the DataFrame and in the CSV file.
+        heading: Short heading with its unit.
+        decimals: Digits after the point; None for text.
+        group: Heading above several neighbouring columns.
+    """
+
+    name: str
+    heading: str
+    decimals: int | None = None
+    group: str = ""
+
+    def text(self, value: Any) -> str:
+        """Write one value."""
+        if value is None or pd.isna(value):
+            return MISSING
+        if self.decimals is None:
+            return str(value)
+        return f"{float(value):,.{self.decimals}f}".replace("-", "−") if value else f"{0:.{self.decimals}f}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as data, with how to show it.
+
+    Attributes:
+        data: One row per method or value.
+        columns: What is shown, in order; `data` holds all of them.
+        apart: Rows that are references, set apart.
+        title: Caption.
+    """
+
+    data: pd.DataFrame
+    columns: tuple[Column, ...]
+    apart: tuple[bool, ...]
+    title: str
+
+    @classmethod
+    def of(cls, data: pd.DataFrame, columns: Sequence[Column], apart: Sequence[bool], title: str) -> Table:
+        """Make a table; columns without any value are left out."""
+        kept = tuple(column for column in columns if data[column.name].notna().any())
+        return cls(data[[column.name for column in kept]].reset_index(drop=True), kept, tuple(apart), title)
+
+    @property
+    def cells(self) -> list[list[str]]:
+        """All values as text."""
+        values = [self.data[column.name].tolist() for column in self.columns]
+        return [[c.text(v) for c, v in zip(self.columns, row, strict=True)] for row in zip(*values, strict=True)]
+
+    @property
+    def groups(self) -> list[tuple[str, int]]:
+        """The upper headings and how many columns each spans."""
+        spans: list[tuple[str, int]] = []
+        for column in self.columns:
+            if spans and spans[-1][0] == column.group:
+                spans[-1] = (column.group, spans[-1][1] + 1)
+            else:
+                spans.append((column.group, 1))
+        return spans
+
+    def latex(self) -> str:
+        """The table in LaTeX with booktabs rules."""
+        keys = pd.MultiIndex.from_tuples([(column.group, column.heading) for column in self.columns])
+        frame = pd.DataFrame(self.cells, columns=keys).replace(MISSING, "--")
+        if not any(column.group for column in self.columns):
+            frame.columns = keys.get_level_values(1)
+        form = "".join("l" if column.decimals is None else "r" for column in self.columns)
+        text: str = frame.to_latex(index=False, escape=True, column_format=form, caption=self.title)
+        return text.replace("−", "$-$").replace("–", "--").replace("µ", r"\textmu ").replace("≥", r"$\geq$")

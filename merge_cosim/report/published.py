@@ -1,0 +1,63 @@
+"""The papers' own figures, shown beside ours and never tuned to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+PGM_PAPER = "Dong, Dolan, Litkouhi 2017 (PGM), Table II"
+FG_GMM_PAPER = "Lyu, Dong, Dolan 2020 (FG-GMM), Table III"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One cell pair of a published table.
+
+    Attributes:
+        failure_pct: Failure rate [%].
+        distance_m: Mean distance to the merging car when the host reaches the merging point [m]; None if not given.
+        source: Paper and table.
+    """
+
+    failure_pct: float
+    distance_m: float | None = None
+    source: str = PGM_PAPER
+
+
+PUBLISHED: dict[str, dict[str, Figure]] = {
+    "us101-replay": {
+        "acc": Figure(17.6, 22.2),
+        "slot": Figure(14.8, 22.8),
+        "ipcb": Figure(19.3, 23.7),
+        "pgm-g": Figure(20.1, 24.3),
+        "pgm": Figure(8.7, 25.8),
+        "fg-gmm": Figure(7.3, 23.3, FG_GMM_PAPER),
+    },
+    "i80-replay": {
+        "acc": Figure(16.5, 7.0),
+        "slot": Figure(10.4, 10.3),
+        "ipcb": Figure(15.8, 13.7),
+        "pgm-g": Figure(11.3, 14.6),
+        "pgm": Figure(7.6, 16.4),
+        "fg-gmm": Figure(7.0, 14.7, FG_GMM_PAPER),
+    },
+    "designed-1": {
+        "acc": Figure(13.3),
+        "slot": Figure(2.4),
+        "ipcb": Figure(0.9),
+        "pgm-g": Figure(0.9),
+        "pgm": Figure(0.4),
+    },
+    "designed-2": {
+        "acc": Figure(6.8),
+        "slot": Figure(4.2),
+        "ipcb": Figure(1.2),
+        "pgm-g": Figure(1.8),
+        "pgm": Figure(0.2),
+    },
+}
+"""By scenario and method. Designed Test I is published over both sites together."""
+
+
+def published(scenario: str, method: str) -> Figure | None:
+    """Return what the papers give for a method in a scenario, if anything."""
+    return PUBLISHED.get(scenario, {}).get(method)

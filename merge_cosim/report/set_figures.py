@@ -1,0 +1,146 @@
+"""Figures over all cases of a scenario: failure maps of grids, delay against ambiguity, varied parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from merge_cosim.report import canvas
+from merge_cosim.report.methods import Look, in_order
+from merge_cosim.report.tables import AMBIGUITY_EDGES, values_in_order
+from merge_cosim.units import FloatArray
+
+GRID_CASE = r"^d(?P<offset>[+-][\d.]+)_h(?P<host>[\d.]+)_m(?P<merging>[\d.]+)$"
+"""Name of a grid's case: the host's offset [m] and both initial speeds [m/s]."""
+CELL = (1.8, 1.9)
+SHOWN_DELAYS = 0.98
+"""Share of the delays inside the axes; the rest is drawn at the upper edge."""
+MOST_NUMBERS = 8
+
+
+def failure_map(results: pd.DataFrame) -> Figure:
+    """Share of failed cases over the host's offsets, by both initial speeds, one small map per method.
+
+    A dot marks speeds at which a host did not reach the merging point in time for at least one offset.
+
+    Args:
+        results: Rows of one grid scenario, named as in `GRID_CASE`.
+    """
+    speeds = results["case"].str.extract(GRID_CASE)[["host", "merging"]].astype(float)
+    rows = results.assign(host=speeds["host"], merging=speeds["merging"], absent=~results["host_reached"])
+    methods = in_order(rows["method"])
+    shares = {method: _by_speeds(rows[rows["method"] == method], "failed") for method in methods}
+    top = max(max(float(share.to_numpy().max()) for share in shares.values()), 1e-3)
+    with canvas.style():
+        figure, axes = canvas.grid_of(len(methods), 4, CELL)
+        for ax, (method, share) in zip(axes, shares.items(), strict=True):
+            x, y = share.columns.to_numpy(dtype=float), share.index.to_numpy(dtype=float)
+            image = ax.imshow(
+                100 * share.to_numpy(), origin="lower", extent=_extent(x, y), vmin=0, vmax=100 * top, cmap="YlOrRd"
+            )
+            absent = _by_speeds(rows[rows["method"] == method], "absent").to_numpy()
+            row, column = np.nonzero(absent)
+            ax.scatter(x[column], y[row], s=1.2, color="#333333", linewidths=0)
+            ax.set_title(method)
+            ax.grid(False)
+            ax.set_aspect("auto")
+        figure.supxlabel("merging car's initial speed [m/s]", fontsize=9)
+        figure.supylabel("host's initial speed [m/s]", fontsize=9)
+        figure.colorbar(image, ax=axes, label="failed offsets [%]", shrink=0.7, aspect=25)
+    return figure
+
+
+def ambiguity_figure(results: pd.DataFrame, looks: Mapping[str, Look]) -> Figure:
+    """Delay of each case against how ambiguous its start was, one small panel per method; failures as crosses."""
+    methods = in_order(results["method"])
+    usual = results[results["method"] != "always-brake"]["delay_s"]
+    top = float(usual.quantile(SHOWN_DELAYS)) if len(usual) else float(results["delay_s"].max())
+    top = max(top * 1.1, 1.0)
+    with canvas.style():
+        figure, axes = canvas.grid_of(len(methods), 4, CELL)
+        for ax, method in zip(axes, methods, strict=True):
+            rows = results[results["method"] == method]
+            failed = rows["failed"].to_numpy(dtype=bool)
+            x, y = rows["ambiguity_s"].to_numpy(), rows["delay_s"].clip(upper=top).to_numpy()
+            beyond = rows["delay_s"].to_numpy() > top
+            color = looks[method].color
+            ax.scatter(x[~failed & ~beyond], y[~failed & ~beyond], s=7, color=color, alpha=0.45, linewidths=0)
+            ax.scatter(x[~failed & beyond], y[~failed & beyond], s=12, marker="^", color=color, alpha=0.45, lw=0)
+            ax.scatter(x[failed], y[failed], s=26, marker="x", color=canvas.FAILED, linewidths=1.3, zorder=4)
+            for edge in AMBIGUITY_EDGES[1:-1]:
+                ax.axvline(edge, color="#bbbbbb", lw=0.8, zorder=0)
+            ax.set_title(method)
+        axes[0].set_xlim(left=0.0)
+        axes[0].set_ylim(top=top * 1.06)
+        figure.supxlabel("|T_m − T_h| at the start [s]", fontsize=9)
+        figure.supylabel("delay [s]", fontsize=9)
+    return figure
+
+
+def variation_figure(summary: pd.DataFrame, parameter: str, looks: Mapping[str, Look]) -> Figure:
+    """Failure rate by the values of one varied parameter, one small panel per source and site.
+
+    Args:
+        summary: Summary rows of one scenario; those with `variation` `parameter=value` are drawn as points or bars,
+            those without variation as dotted lines.
+        parameter: Name of the parameter.
+        looks: How the methods are drawn.
+    """
+    rows = summary.assign(value=summary["variation"].str.partition("=")[2])
+    varied = rows[summary["variation"].str.startswith(f"{parameter}=")]
+    parts = list(varied.groupby(["source", "site"]))
+    values = values_in_order(varied["value"])
+    numbers = pd.to_numeric(pd.Series(values), errors="coerce")
+    is_scale = bool(numbers.notna().all()) and len(values) > 1
+    with canvas.style():
+        figure, axes = canvas.grid_of(len(parts), 2, (canvas.WIDTH if len(parts) == 1 else 3.6, canvas.HEIGHT))
+        methods = in_order(varied["method"])
+        for ax, ((source, site), part) in zip(axes, parts, strict=True):
+            base = rows[(rows["variation"] == "") & (rows["source"] == source) & (rows["site"] == site)]
+            for i, method in enumerate(methods):
+                found = part[part["method"] == method].set_index("value").reindex(values)
+                rate = found["failure_pct"].to_numpy(dtype=float)
+                low, high = found["ci_low_pct"].to_numpy(dtype=float), found["ci_high_pct"].to_numpy(dtype=float)
+                look = looks[method]
+                if is_scale:
+                    x = numbers.to_numpy(dtype=float)
+                    ax.plot(x, rate, "o-", ms=4, color=look.color, label=method)
+                    ax.fill_between(x, low, high, color=look.color, alpha=0.12, lw=0)
+                    for level in base.loc[base["method"] == method, "failure_pct"].dropna():
+                        ax.axhline(level, color=look.color, lw=1.0, ls=":")
+                else:
+                    _bars(ax, i, len(methods), rate, low, high, look, method)
+            if not is_scale:
+                ax.set_xticks(np.arange(len(values)), values)
+                ax.grid(axis="x", visible=False)
+            ax.set_title(f"{site} ({source})" if len(parts) > 1 else "")
+            ax.set(xlabel=parameter, ylim=(0.0, None))
+        axes[0].set_ylabel("failures [%]")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _bars(ax: Any, i: int, n: int, rate: FloatArray, low: FloatArray, high: FloatArray, look: Look, name: str) -> None:
+    width = 0.8 / n
+    x = np.arange(len(rate)) + (i - (n - 1) / 2) * width
+    ax.bar(x, rate, 0.92 * width, color=look.color, label=name)
+    if np.isfinite(low).any():
+        ax.errorbar(x, rate, [rate - low, high - rate], fmt="none", ecolor="#333333", elinewidth=0.8, capsize=2)
+    elif n * len(rate) <= MOST_NUMBERS * 3:
+        for place, height in zip(x, rate, strict=True):
+            ax.annotate(f"{height:.1f}", (place, height), (0, 1), textcoords="offset points", ha="center", fontsize=7)
+
+
+def _by_speeds(rows: pd.DataFrame, column: str) -> pd.DataFrame:
+    return rows.pivot_table(index="host", columns="merging", values=column, aggfunc="mean").fillna(0.0)
+
+
+def _extent(x: FloatArray, y: FloatArray) -> tuple[float, float, float, float]:
+    half_x = (x[1] - x[0]) / 2 if len(x) > 1 else 0.5
+    half_y = (y[1] - y[0]) / 2 if len(y) > 1 else 0.5
+    return float(x[0] - half_x), float(x[-1] + half_x), float(y[0] - half_y), float(y[-1] + half_y)

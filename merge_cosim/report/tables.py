@@ -1,0 +1,161 @@
+"""The tables of a report, as DataFrames with their headings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from merge_cosim.experiments.methods import ORACLE_BEST
+from merge_cosim.report.columns import Column, Table
+from merge_cosim.report.methods import in_order, is_reference
+from merge_cosim.report.published import published
+
+ALL_SITES = "all"
+AMBIGUITY_EDGES = (0.0, 1.0, 3.0, np.inf)
+"""Strata of |T_m - T_h| at the start [s]."""
+
+METHOD = Column("method", "method")
+MAIN = (
+    METHOD,
+    Column("n", "n", 0, "failures"),
+    Column("failures", "count", 0, "failures"),
+    Column("failure_pct", "%", 2, "failures"),
+    Column("interval_pct", "95 % interval", None, "failures"),
+    Column("failure_pct_own", "% but rear-ended", 2, "failures"),
+    Column("censored", "censored", 0, "failures"),
+    Column("bounds_pct", "% best–worst", None, "failures"),
+    Column("published_failure_pct", "%", 1, "published"),
+    Column("published_distance_m", "D m", 1, "published"),
+    Column("host_not_reached", "never arrived", 0, "host at the merging point"),
+    Column("distance_m", "D m", 1, "host at the merging point"),
+    Column("distance_m_safe", "D m, not failed", 1, "host at the merging point"),
+    Column("gap_m", "gap m", 1, "host at the merging point"),
+    Column("delay_s", "delay s", 2, "cost"),
+    Column("hardest_braking", "brake m/s²", 2, "cost"),
+    Column("hardest_braking_p95", "brake 95 %", 2, "cost"),
+    Column("unnecessary_yields", "needless yields", 0, "cost"),
+    Column("decision_flips", "flips", 2, "decision"),
+    Column("correct_at_merge_pct", "correct %", 1, "decision"),
+    Column("cycle_us", "batch", 2, "cycle µs"),
+    Column("cycle_us_single", "alone", 1, "cycle µs"),
+)
+
+
+@dataclass(frozen=True)
+class Section:
+    """What one table of a report is about: a scenario at one site, from one source."""
+
+    scenario: str
+    site: str
+    source: str
+
+    def of(self, frame: pd.DataFrame) -> pd.DataFrame:
+        """The rows of this section, variations left out; site `all` takes every site."""
+        chosen = (frame["scenario"] == self.scenario) & (frame["source"] == self.source) & (frame["variation"] == "")
+        if self.site != ALL_SITES:
+            chosen &= frame["site"] == self.site
+        return frame[chosen]
+
+
+def summary_frame(rows: list[dict[str, Any]]) -> pd.DataFrame:
+    """The summary's rows as a DataFrame, missing values NaN, with the columns that only a reader needs."""
+    frame = pd.DataFrame(rows)
+    figures = [published(row["scenario"], row["method"]) for row in rows]
+    frame["published_failure_pct"] = [figure.failure_pct if figure else np.nan for figure in figures]
+    frame["published_distance_m"] = pd.Series([figure.distance_m if figure else None for figure in figures], dtype=float)
+    frame["interval_pct"] = _ranges(frame["ci_low_pct"], frame["ci_high_pct"])
+    censored = frame["censored"] > 0
+    frame["bounds_pct"] = _ranges(
+        frame["failure_pct_best"].where(censored), frame["failure_pct_worst"].where(censored)
+    )
+    differs = frame["failure_pct_own"].ne(frame["failure_pct"]) & frame["failure_pct"].notna()
+    if not differs.any():
+        frame["failure_pct_own"] = np.nan
+    frame["order"] = frame["method"].map({method: i for i, method in enumerate(in_order(frame["method"]))})
+    return frame.sort_values(["scenario", "variation", "source", "site", "order"], kind="stable", ignore_index=True)
+
+
+def sections(summary: pd.DataFrame) -> list[Section]:
+    """All sections of a report, one per scenario, source and site; the row over all sites last."""
+    rows = summary[summary["variation"] == ""][["scenario", "site", "source"]].drop_duplicates()
+    found = [Section(*row) for row in rows.itertuples(index=False, name=None)]
+    return sorted(found, key=lambda one: (one.scenario, one.source, one.site == ALL_SITES, one.site))
+
+
+def main_table(summary: pd.DataFrame, section: Section) -> Table:
+    """Every measure per method, ours beside the published figures."""
+    rows = _of_section(summary, section)
+    return Table.of(rows, MAIN, list(map(is_reference, rows["method"])), "Outcome by method")
+
+
+def strata_table(results: pd.DataFrame, section: Section) -> Table:
+    """Failure rates by how ambiguous the start is, and without the cases that outlast their log."""
+    rows = section.of(results)
+    rows = rows[~rows["censored"]]
+    columns, parts = [METHOD], {}
+    for low, high in zip(AMBIGUITY_EDGES, AMBIGUITY_EDGES[1:], strict=False):
+        name = f"[{low:g}, {high:g}) s" if np.isfinite(high) else f"≥ {low:g} s"
+        key = f"{low:g}_{high:g}s"
+        parts[key] = rows[(rows["ambiguity_s"] >= low) & (rows["ambiguity_s"] < high)]
+        columns += [Column(f"n_{key}", "n", 0, name), Column(f"failure_pct_{key}", "%", 2, name)]
+    if rows["extended"].any():
+        parts["logged"] = rows[~rows["extended"]]
+        columns += [Column("n_logged", "n", 0, "within the log"), Column("failure_pct_logged", "%", 2, "within the log")]
+    methods = in_order(rows["method"])
+    data = pd.DataFrame({"method": methods})
+    for key, part in parts.items():
+        failed = part.groupby("method")["failed"]
+        data[f"n_{key}"] = failed.size().reindex(methods).fillna(0).astype(int).to_numpy()
+        data[f"failure_pct_{key}"] = (100 * failed.mean().reindex(methods)).to_numpy()
+    title = "Failures by ambiguity at the start, |T_m − T_h|"
+    return Table.of(data, columns, list(map(is_reference, methods)), title)
+
+
+def variation_table(summary: pd.DataFrame, scenario: str, parameter: str) -> Table | None:
+    """All values of a varied parameter, with the unvaried runs first; None if the scenario was not varied so."""
+    rows = summary[(summary["scenario"] == scenario)].copy()
+    rows[["parameter", "value"]] = rows["variation"].str.partition("=")[[0, 2]]
+    varied = rows[rows["parameter"] == parameter]
+    if varied.empty:
+        return None
+    base = rows[(rows["variation"] == "") & rows["method"].isin(varied["method"])].assign(value="as it stands")
+    rows = pd.concat([base, varied])
+    rows["place"] = rows["value"].map({value: i for i, value in enumerate(values_in_order(rows["value"]))})
+    rows = rows.sort_values(["source", "site", "order", "place"], kind="stable")
+    columns = [METHOD, Column("value", parameter), *MAIN[1:-4]]
+    many = [name for name in ("site", "source") if rows[name].nunique() > 1]
+    columns[1:1] = [Column(name, name) for name in many]
+    return Table.of(rows, columns, list(map(is_reference, rows["method"])), f"{scenario}: {parameter} varied")
+
+
+def varied_parameters(summary: pd.DataFrame) -> list[tuple[str, str]]:
+    """Scenario and name of each varied parameter."""
+    rows = summary[summary["variation"] != ""]
+    pairs = zip(rows["scenario"], rows["variation"].str.partition("=")[0], strict=True)
+    return list(dict.fromkeys(pairs))
+
+
+def values_in_order(values: pd.Series) -> list[str]:
+    """Distinct values: text as it comes, then numbers by size."""
+    numbers = pd.to_numeric(values, errors="coerce")
+    texts = values[numbers.isna()].drop_duplicates().tolist()
+    return texts + values[numbers.notna()].loc[numbers.dropna().sort_values().index].drop_duplicates().tolist()
+
+
+def runs_in_sumo(results: pd.DataFrame) -> pd.DataFrame:
+    """The rows that were simulated, without those that the statistics picked from others."""
+    return results[results["method"] != ORACLE_BEST]
+
+
+def _of_section(summary: pd.DataFrame, section: Section) -> pd.DataFrame:
+    rows = summary[summary["variation"] == ""]
+    same = (rows["scenario"] == section.scenario) & (rows["site"] == section.site) & (rows["source"] == section.source)
+    return rows[same]
+
+
+def _ranges(low: pd.Series, high: pd.Series) -> list[str | None]:
+    pairs = zip(low.tolist(), high.tolist(), strict=True)
+    return [None if pd.isna(a) or pd.isna(b) else f"{a:.1f}–{b:.1f}" for a, b in pairs]

@@ -1,0 +1,149 @@
+"""What SUMO's own traffic on an NGSIM ramp is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Drivers:
+    """A share of the drivers, in the terms of SUMO's model EIDM (Salles, Kaufmann, Reuss 2020).
+
+    Attributes:
+        share: Their share of the traffic.
+        length: Length of their cars [m].
+        tau: Time gap that they keep [s].
+        accel, decel: Comfortable acceleration and deceleration [m/s^2].
+    """
+
+    share: float
+    length: float
+    tau: float
+    accel: float
+    decel: float
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Demand, speeds and drivers of the surrogate of one site.
+
+    Attributes:
+        site: Name of the site and of the ramp.
+        seeds: SUMO's random seed of each recording.
+        duration: Length of a recording [s].
+        warm_up: Simulated before it and thrown away [s].
+        through: Cars per hour that stay on the main road.
+        leaving: Cars per hour from the main road to the off-ramp.
+        merging: Cars per hour on the on-ramp.
+        approach_speed: Speed limit of the main lanes up to the gore [m/s].
+        beside_speed: The same beside the auxiliary lane.
+        onward_speed: The same beyond it.
+        ramp_speed: Speed limit of the on-ramp [m/s].
+        auxiliary_speed: Speed limit of the auxiliary lane [m/s].
+        exit_speed: Speed limit of the off-ramp [m/s].
+        waves: Seconds between slowdowns of the lanes beyond the auxiliary lane; the traffic waves that they send
+            upstream make gaps and speeds uneven. 0 for none.
+        wave_speed: Speed limit there during a slowdown [m/s].
+        wave_time: Length of a slowdown [s].
+        filmed_from: The on-ramp is filmed from here on [m past the gore].
+        speed_factor: Spread of desired speeds: normal, mean, deviation, lowest, highest (as a factor of the limit).
+        min_gap: Gap to the car ahead at standstill [m].
+        assertive: How small a gap a driver takes when he must change lane (`lcAssertive`).
+        strategic: How early he wants to change (`lcStrategic`).
+        cooperative: How willing he is to make room (`lcCooperative`), 0 to 1.
+        speed_gain: How eager he is to change for a faster lane (`lcSpeedGain`).
+        change_time: Length of a lane change [s]; the car counts for the new lane from its middle on.
+        drivers: The kinds of drivers.
+    """
+
+    site: str
+    seeds: tuple[int, ...]
+    duration: float
+    warm_up: float
+    through: float
+    leaving: float
+    merging: float
+    approach_speed: float
+    beside_speed: float
+    onward_speed: float
+    ramp_speed: float
+    auxiliary_speed: float
+    exit_speed: float
+    waves: float
+    wave_speed: float
+    wave_time: float
+    filmed_from: float
+    speed_factor: tuple[float, float, float, float]
+    min_gap: float
+    assertive: float
+    strategic: float
+    cooperative: float
+    speed_gain: float
+    change_time: float
+    drivers: tuple[Drivers, ...]
+
+
+DRIVERS = (
+    Drivers(share=0.40, length=4.7, tau=0.8, accel=2.2, decel=3.0),
+    Drivers(share=0.30, length=5.2, tau=1.2, accel=1.8, decel=2.5),
+    Drivers(share=0.27, length=4.4, tau=0.6, accel=2.5, decel=3.0),
+    Drivers(share=0.03, length=14.0, tau=1.6, accel=1.0, decel=2.0),
+)
+
+RECIPES = {
+    "us101": Recipe(
+        site="us101",
+        seeds=(1, 2),
+        duration=900.0,
+        warm_up=240.0,
+        through=7000.0,
+        leaving=350.0,
+        merging=560.0,
+        approach_speed=15.5,
+        beside_speed=15.5,
+        onward_speed=15.5,
+        ramp_speed=18.0,
+        auxiliary_speed=18.0,
+        exit_speed=14.0,
+        waves=0.0,
+        wave_speed=8.0,
+        wave_time=20.0,
+        filmed_from=-34.0,
+        speed_factor=(1.0, 0.15, 0.7, 1.3),
+        min_gap=2.0,
+        assertive=1.5,
+        strategic=2.0,
+        cooperative=1.0,
+        speed_gain=1.0,
+        change_time=3.0,
+        drivers=DRIVERS,
+    ),
+    "i80": Recipe(
+        site="i80",
+        seeds=(1, 2),
+        duration=900.0,
+        warm_up=240.0,
+        through=8000.0,
+        leaving=0.0,
+        merging=600.0,
+        approach_speed=16.5,
+        beside_speed=16.5,
+        onward_speed=16.5,
+        ramp_speed=18.0,
+        auxiliary_speed=18.0,
+        exit_speed=14.0,
+        waves=0.0,
+        wave_speed=8.0,
+        wave_time=20.0,
+        filmed_from=-75.0,
+        speed_factor=(1.0, 0.15, 0.7, 1.3),
+        min_gap=2.0,
+        assertive=1.5,
+        strategic=2.0,
+        cooperative=1.0,
+        speed_gain=1.0,
+        change_time=3.0,
+        drivers=DRIVERS,
+    ),
+}
+"""The surrogate of each site."""

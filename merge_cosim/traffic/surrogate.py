@@ -1,0 +1,85 @@
+"""The surrogate: SUMO's own traffic at an NGSIM site, in NGSIM's format, so that everything works without a download."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from merge_cosim.files import cache_folder
+from merge_cosim.ngsim.sites import Site, site
+from merge_cosim.ramps.definition import FILE_NAME
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.traffic.ngsim_format import ngsim_rows
+from merge_cosim.traffic.recipe import RECIPES, Recipe
+from merge_cosim.traffic.sumo_run import simulate
+
+SURROGATE_VERSION = 1
+"""Raised when the same recipe would give other files, so that cached ones are made anew."""
+
+PROCESSES = 2
+"""Recordings that are simulated at the same time."""
+
+
+def surrogate_folder(site: Site) -> Path:
+    """Return the folder with the synthetic trajectories of `site`; made first, with SUMO, if they are not cached."""
+    return cached_surrogate(RECIPES[site.name])
+
+
+def cached_surrogate(recipe: Recipe) -> Path:
+    """Return the folder that holds what `generate` makes of a recipe, from the cache if it was made before."""
+    ramp = Ramp.load(recipe.site)
+    folder = cache_folder("surrogate") / f"{recipe.site}-{_key(recipe, ramp)}"
+    if not folder.is_dir():
+        made = Path(tempfile.mkdtemp(dir=folder.parent))
+        try:
+            generate(recipe, ramp, made / f"{recipe.site}-surrogate.parquet")
+            made.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # else another process was faster
+                raise
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
+    return folder
+
+
+def generate(recipe: Recipe, ramp: Ramp, target: Path) -> None:
+    """Simulate a recipe and write it as one NGSIM file, the same bytes every time.
+
+    Args:
+        recipe: The traffic; each of its seeds is one recording.
+        ramp: Where it drives.
+        target: The Parquet file to write, in NGSIM's columns and units.
+
+    Raises:
+        UserError: SUMO fails.
+    """
+    where = site(recipe.site)
+    assert ramp.ngsim is not None
+    end = where.length - ramp.ngsim.gore_local_y
+
+    def record(recording: int) -> pa.Table:
+        with tempfile.TemporaryDirectory() as scratch:
+            run = simulate(recipe, ramp, recipe.seeds[recording], end, Path(scratch))
+            return ngsim_rows(run, recipe, ramp, where, recording)
+
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        table = pa.concat_tables(pool.map(record, range(len(recipe.seeds))))
+    raw = pa.array(np.zeros(table.num_rows, dtype=bool))
+    source = pa.array([f"surrogate: SUMO {version('eclipse-sumo')}"] * table.num_rows)
+    table = table.append_column("source", source).append_column("smoothed", raw)
+    pq.write_table(table, target, compression="zstd")
+
+
+def _key(recipe: Recipe, ramp: Ramp) -> str:
+    """A short hash of everything that the trajectories depend on."""
+    facts = f"{recipe!r}|{version('eclipse-sumo')}|{SURROGATE_VERSION}"
+    content = facts.encode() + ramp.net.read_bytes() + (ramp.net.parent / FILE_NAME).read_bytes()
+    return hashlib.sha256(content).hexdigest()[:16]

@@ -1,0 +1,89 @@
+"""The loop: SUMO moves as the closed form does, and no case feels its tile, its batch or its neighbours."""
+
+import numpy as np
+import pytest
+from cases import random_encounters
+
+from merge_cosim.control.base import controllers
+from merge_cosim.cosim.loop import Driver, Run, simulate
+from merge_cosim.cosim.plant import NumpyPlant, SumoPlant
+from merge_cosim.cosim.scoring import Rules
+from merge_cosim.encounter import Encounters
+from merge_cosim.intention.base import estimators
+from merge_cosim.intention.model import IntentionModel
+from merge_cosim.observation import Setting
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.traffic.base import merging_cars
+
+
+def run(plant, encounters: Encounters, method: str, traced=()) -> Run:
+    estimator = estimators[method]()
+    if estimator.needs_model:
+        estimator.use(IntentionModel.load("us101-ngsim"))
+    driver = Driver(estimator, controllers[estimator.default_controller]())
+    return simulate(plant, encounters, driver, merging_cars["designed"](), Rules(), Setting(), traced)
+
+
+def on_sumo(ramp: str, tiles: int, encounters: Encounters, method: str, traced=()) -> Run:
+    plant = SumoPlant(Ramp.load(ramp), tiles)
+    try:
+        return run(plant, encounters, method, traced)
+    finally:
+        plant.close()
+
+
+def assert_same(one: Run, other: Run) -> None:
+    for name, column in one.columns.items():
+        np.testing.assert_array_equal(column, other.columns[name], err_msg=name)
+
+
+@pytest.mark.parametrize(("ramp", "merge_position"), [("designed", 0.0), ("us101", 41.0), ("i80", 63.0)])
+def test_sumo_drives_as_the_closed_form_does(ramp, merge_position):
+    encounters = random_encounters(200, seed=1, merge_position=merge_position)
+    sumo = on_sumo(ramp, 32, encounters, "acc")
+    assert sumo.effort.worst_difference_m < 1e-6
+    closed = run(NumpyPlant(32), encounters, "acc")
+    np.testing.assert_allclose(sumo.columns["end_station"], closed.columns["end_station"], atol=1e-6)
+    np.testing.assert_array_equal(sumo.columns["kind"], closed.columns["kind"])
+
+
+@pytest.mark.parametrize("method", ["slot", "pgm"])
+def test_tile_count_does_not_matter(method):
+    encounters = random_encounters(150, seed=2)
+    reference = on_sumo("designed", 1, encounters, method)
+    for tiles in (7, 64, 128):
+        assert_same(reference, on_sumo("designed", tiles, encounters, method))
+
+
+def test_order_and_neighbours_do_not_matter():
+    encounters = random_encounters(60, seed=3)
+    order = np.random.default_rng(0).permutation(60)
+    straight = on_sumo("designed", 16, encounters, "pgm")
+    shuffled = on_sumo("designed", 16, encounters.take(order), "pgm")
+    for name, column in straight.columns.items():
+        np.testing.assert_array_equal(column[order], shuffled.columns[name], err_msg=name)
+
+
+def test_a_case_alone_ends_as_in_its_batch_and_can_be_traced():
+    encounters = random_encounters(40, seed=4)
+    batch = on_sumo("designed", 16, encounters, "acc", traced=(5,))
+    alone = on_sumo("designed", 1, encounters.take(np.array([5])), "acc", traced=(0,))
+    for name, column in batch.columns.items():
+        np.testing.assert_array_equal(column[5:6], alone.columns[name], err_msg=name)
+    assert batch.traces[5] == alone.traces[0]
+    trace = alone.traces[0]
+    assert len(trace["time_s"]) == alone.columns["end_cycle"][0]
+    assert trace["host_station_m"][0] == np.round(encounters.host_station[5], 6)
+    # one cycle of the trace obeys the law of motion
+    assert trace["host_station_m"][1] == pytest.approx(
+        trace["host_station_m"][0] + 0.1 * trace["host_speed_m_s"][1], abs=2e-6
+    )
+
+
+def test_sumo_reports_the_overlaps_of_the_designed_ramp():
+    encounters = random_encounters(300, seed=5)
+    result = on_sumo("designed", 64, encounters, "always-go")
+    failed = result.columns["kind"] > 0
+    assert failed.sum() > 5
+    # SUMO's contact is counted only where the bodies meet on one edge: see docs/collisions.md
+    assert (failed != (result.columns["sumo_collision"] > 0)).sum() <= 0.05 * failed.sum() + 1

@@ -1,0 +1,40 @@
+import pytest
+from ngsim_files import car, write_csv, write_portal
+
+from merge_cosim.errors import UserError
+from merge_cosim.ngsim.convert import Recording, convert
+from merge_cosim.ngsim.data import load_trajectories
+from merge_cosim.ngsim.sites import I80, US101
+
+
+@pytest.fixture
+def portal(tmp_path):
+    rows = [("us-101", row) for row in car(1, range(5)) + car(2, range(3))]
+    rows += [("i-80", row) for row in car(7, range(4), location="i-80")] + [("lankershim", rows[0][1])]
+    return write_portal(tmp_path / "rows.csv", rows)
+
+
+def test_one_file_per_site(portal, tmp_path):
+    done = convert([portal], tmp_path / "out")
+    assert done.recordings == [
+        Recording("us101", "2005-06-15T0750", 8, 2),
+        Recording("i80", "2005-04-13T1559", 4, 1),
+    ]
+    assert (done.rows, done.kept, done.elsewhere) == (13, 12, {"lankershim": 1})
+    assert load_trajectories(tmp_path / "out", US101).num_rows == 8
+    assert load_trajectories(done.written["i80"], I80).num_rows == 4
+
+
+def test_one_site_of_several_files(portal, tmp_path):
+    more = write_csv(tmp_path / "more.csv", car(2, range(2, 6)))
+    done = convert([portal, more], tmp_path / "out", US101)
+    assert list(done.written) == ["us101"]
+    assert (done.kept, done.repeats.dropped, done.elsewhere) == (11, 1, {"lankershim": 1, "i80": 4})
+    with pytest.raises(UserError, match=r"more\.csv: no row of i80"):
+        convert([portal, more], tmp_path / "out", I80)
+
+
+def test_a_file_is_not_overwritten_by_itself(portal, tmp_path):
+    done = convert([portal], tmp_path / "out")
+    with pytest.raises(UserError, match="would be overwritten"):
+        convert([done.written["us101"]], tmp_path / "out")

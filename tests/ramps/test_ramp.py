@@ -1,0 +1,140 @@
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from merge_cosim.errors import UserError
+from merge_cosim.files import shipped
+from merge_cosim.ngsim.sites import SITES
+from merge_cosim.ramps.ramp import LanePosition, Ramp, ramp_names
+
+NAMES = ("designed", "i80", "us101")
+
+
+def copy_with(folder: Path, old: str, new: str, name: str = "us101") -> Path:
+    """A copy of a shipped ramp whose ramp.toml has one passage replaced."""
+    for path in (shipped("sumo_nets") / name).iterdir():
+        text = path.read_text()
+        if path.name == "ramp.toml":
+            assert old in text
+            text = text.replace(old, new, 1)
+        (folder / path.name).write_text(text)
+    return folder
+
+
+def test_shipped_ramps_are_found() -> None:
+    assert ramp_names() == sorted(NAMES)
+
+
+def test_designed_ramp_joins_by_a_connection() -> None:
+    ramp = Ramp.load("designed")
+    assert not ramp.changes_lane
+    assert ramp.auxiliary_end == math.inf
+    assert ramp.merging_point == 0.0
+    assert ramp.main_route == ("main_in", "main_out")
+    assert ramp.ramp_route == ("ramp", "main_out")
+    assert ramp.place("main", -90.0, 0.0) == LanePosition("main_in", 0, 410.0)
+    assert ramp.place("ramp", -90.0, 0.0) == LanePosition("ramp", 0, 410.0)
+    assert ramp.place("ramp", 0.0, 0.0) == LanePosition("main_out", 0, 0.0)
+
+
+def test_us101_has_an_auxiliary_lane() -> None:
+    ramp = Ramp.load("us101")
+    assert ramp.changes_lane
+    assert ramp.auxiliary_end == pytest.approx(213.0)
+    assert ramp.ramp_route == ("ramp", "weave", "main_out")
+    assert [ramp.host_lane_on(edge) for edge in ramp.main_route] == [0, 1, 0]
+    assert ramp.place("main", -42.0, 42.0) == LanePosition("weave", 1, 0.0)
+    assert ramp.place("ramp", -50.0, 42.0) == LanePosition("ramp", 0, 492.0)
+    assert ramp.place("ramp", -12.0, 42.0) == LanePosition("weave", 0, 30.0)
+    assert ramp.place("ramp", 8.0, 42.0) == LanePosition("weave", 1, 50.0)
+    assert ramp.place("ramp", 200.0, 42.0) == LanePosition("main_out", 0, 29.0)
+    assert ramp.station("weave", 0, 30.0, 42.0) == -12.0
+    with pytest.raises(ValueError, match="'ramp' is no edge of the main road"):
+        ramp.host_lane_on("ramp")
+
+
+@given(
+    name=st.sampled_from(NAMES),
+    path=st.sampled_from(("main", "ramp")),
+    station=st.floats(-400.0, 1400.0),
+    share=st.floats(0.0, 1.0),
+)
+def test_station_is_the_inverse_of_place(name: str, path: str, station: float, share: float) -> None:
+    ramp = Ramp.load(name)
+    merge_position = share * (ramp.auxiliary_end if ramp.changes_lane else 0.0)
+    if station + merge_position > ramp.downstream:
+        return
+    place = ramp.place(path, station, merge_position)  # type: ignore[arg-type]
+    assert ramp.station(*place, merge_position) == pytest.approx(station, abs=1e-9)
+    if path == "main" or station >= 0.0:
+        assert place.lane == ramp.host_lane_on(place.edge)
+
+
+def test_edges_of_awkward_lengths_end_exactly_at_the_gore(tmp_path: Path) -> None:
+    folder = copy_with(tmp_path, 'ramp = ["ramp"]', 'ramp = ["ramp0", "ramp1", "ramp"]', "designed")
+    file = folder / "ramp.toml"
+    file.write_text(file.read_text().replace("merging_lane = [0]", "merging_lane = [0, 0, 0]"))
+    net = folder / "designed.net.xml"
+    lane = '<lane id="ramp{0}_0" index="0" speed="29" length="{1}" shape="0,0 1,0"/>'
+    edge = f'<edge id="ramp{{0}}" from="a{{0}}" to="b{{0}}">{lane}</edge>'
+    nodes = '<junction id="{}{}" type="dead_end" x="0" y="0" incLanes="" intLanes="" shape=""/>'
+    extra = "".join(edge.format(i, length) for i, length in enumerate((0.1, 0.2)))
+    extra += "".join(nodes.format(end, i) for end in "ab" for i in range(2))
+    net.write_text(net.read_text().replace("</net>", extra + "</net>"))
+    ramp = Ramp.load(folder)
+    assert ramp.ramp[-1].end == 0.0
+    assert not ramp.changes_lane
+    assert ramp.ramp_route == ("ramp0", "ramp1", "ramp", "main_out")
+    assert ramp.place("ramp", 0.0, 0.0) == LanePosition("main_out", 0, 0.0)
+
+
+def test_off_the_net_names_the_reach() -> None:
+    ramp = Ramp.load("us101")
+    with pytest.raises(UserError, match=r"reaches from -542.0 to 1458.0 m"):
+        ramp.place("main", -543.0, 42.0)
+    with pytest.raises(UserError, match="off the auxiliary lane"):
+        ramp.place("ramp", 0.0, 214.0)
+    with pytest.raises(UserError, match="off the auxiliary lane"):
+        ramp.place("ramp", 0.0, -1.0)
+    with pytest.raises(ValueError, match="on neither path"):
+        ramp.station("exit", 0, 3.0, 42.0)
+
+
+def test_unknown_name_lists_the_choices() -> None:
+    with pytest.raises(UserError, match="designed, i80, us101"):
+        Ramp.load("us102")
+
+
+def test_folder_works_as_well_as_name() -> None:
+    assert Ramp.load(shipped("sumo_nets") / "us101") == Ramp.load("us101")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("merging_point", "mergin_point", r"ramp.toml: mergin_point: unknown key; did you mean 'merging_point'"),
+        ("merging_point = 42.0", "merging_point = 'far'", r"ramp.toml: merging_point: .*number"),
+        ('gore = "weave"', 'gore = "main_in"', "gore must be an edge of main after the first"),
+        ("host_lane = [0, 1, 0]", "host_lane = [0, 1]", "host_lane needs one lane index per edge"),
+        ("host_lane = [0, 1, 0]", "host_lane = [0, 6, 0]", "'weave' has no lane 6; its lanes are 0 ... 5"),
+        ('ramp = ["ramp", "weave"]', 'ramp = ["onramp", "weave"]', "ramp: the net us101.net.xml has no edge 'onramp'"),
+        ('ramp = ["ramp", "weave"]', 'ramp = ["weave", "ramp"]', "must be its last ones and start with gore"),
+        ('net = "us101.net.xml"', 'net = "us102.net.xml"', "us102.net.xml: no such net; build it"),
+        ("main = [", "main = ", "not valid TOML"),
+    ],
+)
+def test_a_mistake_in_the_file_is_one_clear_line(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(UserError, match=message) as caught:
+        Ramp.load(copy_with(tmp_path, old, new))
+    assert "\n" not in str(caught.value)
+
+
+def test_gore_is_where_the_trajectories_have_it() -> None:
+    for site in SITES:
+        mapping = Ramp.load(site.name).ngsim
+        assert mapping is not None
+        assert mapping.gore_local_y == pytest.approx(site.gore_y, abs=0.01)
+        assert {site.host_lane, *site.ramp_lanes} <= set(mapping.lanes)
