@@ -1,12 +1,13 @@
 # make demo: the main job. make test: the tests. Both make the virtual environment first, with nothing but python3.
 PYTHON ?= python3
 VENV := .venv
+DEMO := acc slot pgm always-go always-yield always-brake oracle-best
 BIN := $(VENV)/bin
 
 .PHONY: demo test lint clean
 
 demo: $(VENV)/installed
-	$(BIN)/merge-cosim sweep designed-2 --out out/demo
+	$(BIN)/merge-cosim sweep designed-2 $(DEMO:%=--method %) --out out/demo
 	$(BIN)/merge-cosim report out/demo
 
 test: $(VENV)/installed

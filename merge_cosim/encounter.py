@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
@@ -146,6 +147,18 @@ class Encounters:
         """Return the chosen encounters, in that order."""
         arrays = {f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "log"}
         return replace(self, **arrays, log=None if self.log is None else self.log.take(rows))
+
+    def digest(self) -> str:
+        """A short hash of all that the encounters hold."""
+        values = [getattr(self, f.name) for f in fields(self)]
+        if self.log is not None:
+            values += [getattr(self.log, f.name) for f in fields(self.log)]
+        held = hashlib.sha256()
+        for value in values:
+            for array in (value.values, value.offsets) if isinstance(value, Ragged) else (value,):
+                if isinstance(array, np.ndarray):
+                    held.update("\0".join(array.tolist()).encode() if array.dtype.kind == "U" else array.tobytes())
+        return held.hexdigest()[:16]
 
     @staticmethod
     def concatenate(parts: Sequence[Encounters]) -> Encounters:

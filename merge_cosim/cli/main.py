@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -76,8 +75,12 @@ def sweep(
         plugins=plugin or (),
         jobs=jobs or os.cpu_count() or 1,
     )
-    with sweep_progress() as progress:
-        run_sweep(request, out, resume, progress)
+    try:
+        with sweep_progress() as progress:
+            run_sweep(request, out, resume, progress)
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted: what was finished is kept in {out}; go on with --resume", err=True)
+        raise typer.Exit(130) from None
     from merge_cosim.experiments.store import MANIFEST, SUMMARY_JSON, ResultFolder
 
     folder = ResultFolder(out)
@@ -227,9 +230,6 @@ def main() -> None:
         app()
     except UserError as error:
         die(str(error))
-    except KeyboardInterrupt:
-        typer.echo("interrupted; what was finished is kept, go on with --resume", err=True)
-        sys.exit(130)
 
 
 if __name__ == "__main__":

@@ -111,3 +111,27 @@ def summary(
         console.print(f"{each.site} ({each.source})")
         for name, text in lines.items():
             console.print(f"  {name}: {text}", soft_wrap=True)
+
+
+@app.command("surrogate")
+def surrogate(
+    out: Out,
+    site: Annotated[str | None, typer.Option("--site", help="Only this site (us101, i80).")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write synthetic trajectories, SUMO's own traffic, in NGSIM's format."""
+    import json
+
+    import pyarrow.parquet as pq
+
+    from merge_cosim.ngsim.sites import SITES
+    from merge_cosim.ngsim.sites import site as find_site
+    from merge_cosim.traffic.surrogate import export
+
+    written = {each.name: export(each, out) for each in ([find_site(site)] if site else SITES)}
+    if as_json:
+        rows = {name: pq.read_metadata(path).num_rows for name, path in written.items()}
+        print(json.dumps([{"site": n, "file": str(p), "rows": rows[n], "source": "surrogate"} for n, p in written.items()]))
+        return
+    for path in written.values():
+        print(f"wrote {path} (synthetic)")

@@ -167,7 +167,7 @@ _KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules]] =
 
 
 def _first_problem(error: ValidationError) -> str:
-    first = error.errors()[0]
+    first = min(error.errors(), key=lambda one: one["type"] == "missing")  # a misspelt key is missing, too
     *place, key = first["loc"]
     shown = ".".join(str(part) for part in first["loc"] if part not in ("grid", "pairs", "[key]"))
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from scipy.stats import binomtest
 
 from merge_cosim.experiments.methods import CONSTANT, ORACLE_BEST
 from merge_cosim.experiments.outcome import SCHEMA
@@ -106,6 +105,8 @@ def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
 
 
 def _wilson(failures: int, n: int) -> tuple[float, float]:
+    from scipy.stats import binomtest  # half a second to import, which a worker process need not pay
+
     interval = binomtest(failures, n).proportion_ci(method="wilson")
     return round(100 * interval.low, 4), round(100 * interval.high, 4)
 

@@ -32,7 +32,7 @@ from merge_cosim.experiments.methods import (
 from merge_cosim.experiments.scenario import Scenario, load_scenario
 from merge_cosim.experiments.sources import SourceChoice, load_encounters
 from merge_cosim.experiments.statistics import oracle_best, summarise
-from merge_cosim.experiments.store import MANIFEST, RESULTS, SUMMARY_CSV, SUMMARY_JSON, ResultFolder
+from merge_cosim.experiments.store import MANIFEST, SUMMARY_CSV, SUMMARY_JSON, ResultFolder
 from merge_cosim.experiments.work import Batch, Workplace, run_batch, simulate_batch
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
@@ -189,9 +189,6 @@ def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Prog
     folder.write_json(SUMMARY_JSON, summary.astype(object).where(summary.notna(), None).to_dict("records"))
     manifest = {
         **_identity(request, batches),
-        "scenarios": {
-            batch.scenario.name: batch.scenario.model_dump(mode="json") for batch in batches if not batch.variation
-        },
         "left_out": {batch.scenario.name: list(batch.left_out) for batch in batches if batch.left_out},
         "command": {"jobs": request.jobs, "resumed": resume},
         "wall_s": round(perf_counter() - begin, 3),
@@ -311,16 +308,15 @@ def _identity(request: SweepRequest, batches: list[Batch]) -> dict[str, Any]:
         "methods": sorted({batch.method.name for batch in batches}),
         "settings": {key: str(value) for key, value in request.settings.items()},
         "variations": [[name, [str(value) for value in values]] for name, values in request.variations],
-        "models": {name: _digest(model) for name, model in models.items()},
-        "encounters": _digest([(batch.scenario, batch.variation, batch.encounters) for batch in batches]),
+        "models": {name: _digest(model.to_json()) for name, model in models.items()},
+        "scenarios": {
+            " ".join(filter(None, (batch.scenario.name, batch.variation))): batch.scenario.model_dump(mode="json")
+            for batch in batches
+        },
+        "encounters": _digest("".join(batch.encounters.digest() for batch in batches)),
         "plugins": {plugin.name: hashlib.sha256(plugin.read_bytes()).hexdigest()[:16] for plugin in request.plugins},
     }
 
 
-def _digest(value: object) -> str:
-    import pickle
-
-    return hashlib.sha256(pickle.dumps(value)).hexdigest()[:16]
-
-
-__all__ = ["RESULTS", "SweepRequest", "plan", "sweep"]
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

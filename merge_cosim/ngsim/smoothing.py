@@ -8,7 +8,6 @@ a merging car goes through the causal filter, which at each cycle knows only the
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from merge_cosim.units import FloatArray, IntArray
 
@@ -29,6 +28,8 @@ def smooth_position(position: FloatArray, window: int, order: int) -> FloatArray
     Returns:
         Smoothed positions [m], shape (n,), non-decreasing: SUMO's cars do not reverse.
     """
+    from scipy.signal import savgol_filter  # takes half a second to import, which only new data should cost
+
     fitting = min(window, len(position) - 1 + len(position) % 2)
     smooth = savgol_filter(position, fitting, order) if fitting > order else position
     return np.maximum.accumulate(np.asarray(smooth, dtype=np.float64))
@@ -65,5 +66,7 @@ def filter_causally(values: FloatArray, window: int, order: int) -> FloatArray:
 
 def _last_value_taps(window: int, order: int) -> FloatArray:
     """Weights that give the last value of a fit to `window` values (of a lower order where these are too few)."""
+    from scipy.signal import savgol_coeffs
+
     taps = savgol_coeffs(window, min(order, window - 1), pos=window - 1, use="dot")
     return np.asarray(taps, dtype=np.float64)

@@ -160,7 +160,7 @@ class Ramp:
         raise ValueError(f"{self.name}: '{edge}' is no edge of the main road; these are {', '.join(self.main_route)}")
 
     def holds(self, merge_position: FloatArray, host_station: FloatArray, merging_station: FloatArray) -> BoolArray:
-        """Which encounters fit on the ramp: merging point beside the ramp's lane, both starts on the net; shape (n,)."""
+        """Which encounters fit: merging point beside the ramp's lane, both starts on the net; shape (n,)."""
         beside = (merge_position >= 0.0) & (merge_position <= self.auxiliary_end)
         start = np.minimum(host_station, merging_station) + merge_position
         return beside & (start >= -self.upstream) & (host_station + merge_position < self.downstream)

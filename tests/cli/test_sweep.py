@@ -1,0 +1,224 @@
+"""Sweeps through the real command line."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pyarrow.parquet as pq
+import pytest
+from command import merge_cosim, small_scenario, summary
+
+CONTRACT = (
+    "scenario source case method failed failure_kind censored host_reached host_first label distance_m gap_m min_gap_m "
+    "min_ttc_s delay_s hardest_braking decision_flips correct_at_merge"
+).split()
+SUMMARY_CONTRACT = (
+    "scenario source method n failures failure_pct ci_low_pct ci_high_pct distance_m delay_s cycle_us cycle_us_single"
+).split()
+
+
+def test_a_sweep_writes_the_promised_files(tmp_path):
+    scenario = small_scenario(tmp_path)
+    done = merge_cosim("sweep", scenario, "--out", "out", "--jobs", 2, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    rows = pq.read_table(tmp_path / "out/results.parquet").to_pandas()
+    methods = sorted(rows["method"].unique())
+    assert {"acc", "slot", "pgm", "always-go", "always-yield", "always-brake", "oracle-best"} <= set(methods)
+    assert "oracle-label" not in methods  # there is no label here
+    assert (rows.groupby("method").size() == 75).all()
+    assert set(CONTRACT) <= set(rows.columns)
+    listed = document["summary"]
+    assert set(SUMMARY_CONTRACT) <= set(listed[0])
+    for row in listed:
+        own = rows[rows["method"] == row["method"]]
+        assert row["failures"] == own["failed"].sum()
+        assert row["n"] == (~own["censored"]).sum()
+        assert row["ci_low_pct"] is None  # a fixed grid is no sample
+    manifest = json.loads((tmp_path / "out/manifest.json").read_text())
+    assert manifest["vehicle_steps"] > 0
+    assert manifest["worst_station_difference_m"] < 1e-6
+    assert not (tmp_path / "out/parts").exists()
+    best = summary(tmp_path / "out")["oracle-best"]
+    assert best["failures"] <= min(summary(tmp_path / "out")[name]["failures"] for name in ("always-go", "always-yield"))
+
+
+def test_one_process_or_two_give_the_same_bytes(tmp_path):
+    scenario = small_scenario(tmp_path)
+    for jobs in (1, 2):
+        arguments = ("sweep", scenario, "--method", "pgm", "--method", "slot", "--out", f"out{jobs}", "--jobs", jobs)
+        assert merge_cosim(*arguments, cwd=tmp_path).returncode == 0
+    one, two = ((tmp_path / f"out{jobs}/results.parquet").read_bytes() for jobs in (1, 2))
+    assert one == two
+
+
+def test_a_case_alone_ends_as_in_the_sweep(tmp_path):
+    scenario = small_scenario(tmp_path)
+    merge_cosim("sweep", scenario, "--method", "acc", "--out", "out", cwd=tmp_path)
+    in_sweep = {row["case"]: row for row in pq.read_table(tmp_path / "out/results.parquet").to_pylist()}
+    for case in ("d+0_h15_m15", "d-4_h25_m5"):
+        alone = merge_cosim(
+            "run", scenario, "--case", case, "--method", "acc", "--trace", f"{case}.csv", "--json", cwd=tmp_path
+        )
+        assert alone.returncode == 0, alone.stderr
+        assert json.loads(alone.stdout) == in_sweep[case]
+        assert (tmp_path / f"{case}.csv").read_text().startswith("time_s,host_station_m")
+
+
+def test_variations_and_settings(tmp_path):
+    scenario = small_scenario(tmp_path)
+    done = merge_cosim(
+        *("sweep", scenario, "--method", "acc", "--method", "always-go", "--set", "test.horizon=2"),
+        *("--vary", "merging.ahead=clear,any", "--vary", "pgm.nodes=1:3:1", "--vary", "speed_limit=20:29:9"),
+        *("--method", "pgm", "--out", "out"),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    rows = json.loads((tmp_path / "out/summary.json").read_text())
+    seen = {(row["variation"], row["method"]) for row in rows}
+    assert ("merging.ahead=any", "acc") in seen
+    assert ("speed_limit=20", "always-go") in seen
+    assert ("pgm.nodes=2", "pgm") in seen
+    assert ("pgm.nodes=2", "acc") not in seen  # it has no such parameter, so nothing would change
+    by = {(row["variation"], row["method"]): row["failures"] for row in rows}
+    assert by["merging.ahead=any", "acc"] <= by["merging.ahead=clear", "acc"]
+
+
+def interrupt(scenario, tmp_path, sent):
+    command = [sys.executable, "-m", "merge_cosim.cli.main", "sweep", "designed-2", "--method", "acc"]
+    process = subprocess.Popen(
+        [*command, "--out", "out", "--jobs", "2"],
+        cwd=tmp_path,
+        env=os.environ,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob("out/parts/*.parquet")) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.killpg(process.pid, sent)
+    _, error = process.communicate(timeout=60)
+    return process.returncode, error
+
+
+@pytest.mark.slow
+def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path):
+    status, error = interrupt("designed-2", tmp_path, signal.SIGINT)
+    assert status == 130
+    assert "--resume" in error
+    assert "Traceback" not in error
+    kept = len(list(tmp_path.glob("out/parts/*.parquet")))
+    assert 0 < kept < 7
+    again = merge_cosim("sweep", "designed-2", "--method", "acc", "--out", "out", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "--resume" in again.stderr
+    other = merge_cosim("sweep", "designed-2", "--method", "slot", "--out", "out", "--resume", cwd=tmp_path)
+    assert other.returncode == 2
+    assert "methods" in other.stderr
+    resumed = merge_cosim("sweep", "designed-2", "--method", "acc", "--out", "out", "--resume", cwd=tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    unbroken = merge_cosim("sweep", "designed-2", "--method", "acc", "--out", "whole", cwd=tmp_path)
+    assert unbroken.returncode == 0
+    assert (tmp_path / "out/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("sweep", "designed2"), "did you mean 'designed-2'"),
+        (("sweep", "small.toml", "--method", "pgn"), "did you mean 'pgm'"),
+        (("sweep", "small.toml", "--method", "acc+foo"), "unknown controller 'foo'"),
+        (("sweep", "small.toml", "--set", "acc.headwy=1"), "did you mean 'headway'"),
+        (("sweep", "small.toml", "--set", "acc.headway=x"), "headway = 'x'"),
+        (("sweep", "small.toml", "--set", "test.horizn=1"), "small.toml: unknown key 'test.horizn'"),
+        (("sweep", "small.toml", "--set", "speed_limit=nan"), "speed_limit"),
+        (("sweep", "small.toml", "--set", "ramp=nosuch"), "no ramp 'nosuch'"),
+        (("sweep", "small.toml", "--set", "encounters.merging_station=-900"), "off the net"),
+        (("sweep", "small.toml", "--set", "merging.model=replay"), "replay"),
+        (("sweep", "small.toml", "--vary", "acc.headway=1:2:0"), "NAME=A:B:STEP"),
+        (("sweep", "small.toml", "--model", "nosuch", "--method", "pgm"), "nosuch: no such model file"),
+        (("sweep", "small.toml", "--plugin", "nosuch.py"), "nosuch.py: no such plugin file"),
+        (("sweep", "us101-replay", "--source", "ngsim"), "MERGE_COSIM_DATA"),
+        (("sweep", "us101-replay", "--data", "nosuch"), "nosuch: no such folder"),
+        (("sweep", "misspelt.toml"), "misspelt.toml: unknown key 'rmap'; did you mean 'ramp'"),
+        (("run", "small.toml", "--case", "nosuch", "--method", "acc"), "no case 'nosuch'"),
+        (("run", "small.toml", "--case", "d+0_h5_m5", "--method", "acc", "--trace", "x.txt"), "x.txt"),
+    ],
+)
+def test_mistakes_get_one_line_and_status_2(tmp_path, arguments, expected):
+    text = small_scenario(tmp_path).read_text()
+    (tmp_path / "misspelt.toml").write_text(text.replace("ramp =", "rmap ="))
+    done = merge_cosim(*arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert expected in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert done.stdout == ""
+
+
+def test_a_plugin_drives_like_ours(tmp_path):
+    scenario = small_scenario(tmp_path)
+    (tmp_path / "mine.py").write_text(
+        """
+from dataclasses import dataclass
+from typing import ClassVar
+import numpy as np
+from merge_cosim.intention.base import Estimator, estimators
+
+@estimators.register
+@dataclass(kw_only=True)
+class Hesitant(Estimator):
+    \"\"\"YIELD only when far ahead.\"\"\"
+    name: ClassVar[str] = "hesitant"
+    lead: float = 10.0
+
+    def update(self, seen):
+        return np.where(seen.host_station - seen.merging_station > self.lead, -1.0, 1.0)
+"""
+    )
+    listed = merge_cosim("methods", "--plugin", "mine.py", "--json", cwd=tmp_path)
+    assert "hesitant" in {row["name"] for row in json.loads(listed.stdout)}
+    arguments = ("--plugin", "mine.py", "--method", "hesitant", "--set", "hesitant.lead=2", "--jobs", 2, "--out", "out")
+    done = merge_cosim("sweep", scenario, *arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert summary(tmp_path / "out")["hesitant"]["n"] == 75
+
+
+def test_a_plugin_that_breaks_is_named(tmp_path):
+    small_scenario(tmp_path)
+    (tmp_path / "broken.py").write_text("1 / 0")
+    done = merge_cosim("sweep", "small.toml", "--plugin", "broken.py", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "broken.py: cannot be imported: ZeroDivisionError" in done.stderr
+
+
+def test_help_lists_and_cache(tmp_path):
+    assert "sweep" in merge_cosim("--help", cwd=tmp_path).stdout
+    scenarios = json.loads(merge_cosim("scenarios", "--json", cwd=tmp_path).stdout)
+    assert {"designed-1", "designed-2", "us101-replay", "i80-replay"} <= {one["scenario"] for one in scenarios}
+    assert json.loads(merge_cosim("cache", "--json", cwd=tmp_path).stdout)["folder"]
+
+
+@pytest.mark.slow
+def test_replay_on_real_data(tmp_path, data_dir):
+    done = merge_cosim("sweep", "us101-replay", "--data", data_dir, "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = pq.read_table(tmp_path / "out/results.parquet").to_pandas()
+    assert set(rows["source"]) == {"ngsim"}
+    assert set(rows["label"]) == {"YIELD", "NOT_YIELD"}
+    assert rows.loc[rows["method"] == "pgm", "model"].unique().tolist() == ["us101-ngsim"]
+    oracle = rows[rows["method"] == "oracle-label"]
+    assert oracle["correct_at_merge"].dropna().all()
+
+
+@pytest.mark.slow
+def test_a_model_is_not_tested_on_its_own_training_cars(tmp_path, data_dir):
+    done = merge_cosim(
+        *("sweep", "us101-replay", "--data", data_dir, "--method", "pgm", "--set", "encounters.seed=5"), cwd=tmp_path
+    )
+    assert done.returncode == 2
+    assert "was trained on" in done.stderr
