@@ -101,7 +101,7 @@ def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
     go_first = pd.MultiIndex.from_frame(frame[CASE]).map(possible.to_dict())
     passed_second = (frame["host_first"] == False).to_numpy()  # noqa: E712 - may be missing
     known = pd.Series(go_first, index=frame.index, dtype="boolean")
-    return known & pd.Series(passed_second, index=frame.index, dtype="boolean")
+    return (known & pd.Series(passed_second, index=frame.index, dtype="boolean")).where(known.notna())
 
 
 def _wilson(failures: int, n: int) -> tuple[float, float]:

@@ -93,8 +93,7 @@ def plan(request: SweepRequest) -> list[Batch]:
             methods = _methods(request.methods, of_components)
             if varied in of_components:
                 methods = [one for one in methods if varied.partition(".")[0] in (one.estimator, one.controller)]
-            for name in dict.fromkeys(request.scenarios):
-                scenario = load_scenario(name, of_scenario)
+            for scenario in _scenarios(request.scenarios, of_scenario, varied):
                 key = repr((scenario.encounters, scenario.is_replay, scenario.ramp))
                 if key not in loaded:
                     loaded[key] = load_encounters(scenario, request.data, request.source)
@@ -103,6 +102,21 @@ def plan(request: SweepRequest) -> list[Batch]:
     if not batches:
         raise UserError("nothing to run: no method fits the scenarios")
     return batches
+
+
+def _scenarios(names: Sequence[str], settings: dict[str, Any], varied: str) -> list[Scenario]:
+    """Load the scenarios; one that does not know what is varied is left as it is, if another does."""
+    loaded, refused = [], []
+    for name in dict.fromkeys(names):
+        try:
+            loaded.append(load_scenario(name, settings))
+        except UserError as error:
+            if varied not in settings:
+                raise
+            refused.append(error)
+    if not loaded:
+        raise refused[0]
+    return loaded
 
 
 def _methods(names: Sequence[str], settings: dict[str, Any]) -> list[Method]:

@@ -1,0 +1,108 @@
+"""Write docs/sensitivity.md: what each choice that the papers leave open does to the failure rates.
+
+    python tools/sensitivity_page.py [--data DIR]
+
+runs one `merge-cosim sweep` with a `--vary` per choice (about five minutes on two cores) and sets its summary out as
+tables, each row one value, each column one method.
+"""
+
+import argparse
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pandas as pd
+
+METHODS = ("acc", "slot", "slot-time", "pgm", "always-go", "always-yield")
+CHOICES = {
+    "merging.ahead=clear,in-lane,any": "When the designed merging car takes the host to be ahead of it",
+    "speed_limit=12,15,20,25,29,33": "Speed limit [m/s]: how fast a host drives that nobody hinders",
+    "acc.min_acceleration=-8,-6,-4,-3,-2": "Hardest braking of the host [m/s²]",
+    "acc.max_acceleration=1,1.5,2,3,4": "Hardest acceleration of the host [m/s²]",
+    "acc.headway=0.5:2.5:0.5": "Time headway of the host's distance keeping [s]",
+    "acc.d0=0,1,2,4": "Gap at standstill [m]",
+    "acc.k_gap=0.1,0.23,0.5": "Gain on the gap error [1/s²]",
+    "test.horizon=0.5,1,2,3,5": "Time that is scored after both cars have reached the merging point [s]",
+    "test.overlap_from=both,lane_change": "From when on an overlap counts",
+    "encounters.length=4,5,6": "Length of both cars [m]",
+    "encounters.rules.max_window=2,3,5.2,8": "Start of the window: at most this long before the lane change [s]",
+    "encounters.merge_point=car,site": "Station 0 at each logged lane change, or at the site's median",
+    "encounters.rules.observed=causal,raw": "What is observed of the merging car's speed",
+}
+HEAD = """# Sensitivity to what the papers leave open
+
+Failure rate in per cent by method, for each choice by itself, everything else as in the scenario file. The value that
+is the default stands in bold. `designed-2` is the grid of Dong, Dolan, Litkouhi 2017, 6,875 cases; `us101-replay` rests
+on {source}. In brackets: the share of hosts that never reached the merging point, where there are any; a method can
+trade the one for the other.
+
+Made by
+
+```
+{command}
+```
+
+followed by `python tools/sensitivity_page.py --from {out}`.
+"""
+
+
+def main() -> None:
+    """Run the sweep, if need be, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", help="folder with NGSIM files")
+    parser.add_argument("--from", dest="folder", type=Path, help="result folder of the sweep, if it was run already")
+    parser.add_argument("--page", type=Path, default=Path("docs/sensitivity.md"))
+    arguments = parser.parse_args()
+    words = ["merge-cosim", "sweep", "designed-2", "us101-replay"]
+    words += [word for method in METHODS for word in ("--method", method)]
+    words += [word for choice in CHOICES for word in ("--vary", choice)]
+    folder = arguments.folder
+    if folder is None:
+        folder = Path(tempfile.mkdtemp(prefix="sensitivity-")) / "out"
+        data = ["--data", arguments.data] if arguments.data else []
+        subprocess.run([sys.executable, "-m", "merge_cosim.cli.main", *words[1:], *data, "--out", folder], check=True)
+    rows = pd.read_json(folder / "summary.json", dtype={"variation": str})
+    real = (rows.loc[rows["scenario"] == "us101-replay", "source"] == "ngsim").all()
+    source = "real NGSIM data (fragments and merging episodes)" if real else "the SYNTHETIC surrogate"
+    command = " ".join(shlex.quote(word) for word in [*words, *(["--data", "DIR"] if real else []), "--out", "OUT"])
+    parts = [HEAD.format(source=source, command=command.replace(" --", " \\\n    --"), out="OUT")]
+    for choice, title in CHOICES.items():
+        parts.append(section(rows, choice.partition("=")[0], title))
+    arguments.page.write_text("\n".join(parts), encoding="utf-8")
+
+
+def section(rows: pd.DataFrame, name: str, title: str) -> str:
+    """One choice: a table per scenario that knows it."""
+    lines = [f"## {title}", "", f"`{name}`", ""]
+    for scenario, here in rows.groupby("scenario"):
+        varied = here[here["variation"].str.startswith(f"{name}=")]
+        if varied.empty:
+            continue
+        default = here[here["variation"] == ""].set_index("method")
+        cells = varied.assign(cell=varied.apply(cell, axis=1), value=varied["variation"].str.partition("=")[2])
+        table = cells.pivot(index="value", columns="method", values="cell").reindex(pd.unique(cells["value"]))
+        methods = [method for method in METHODS if method in table]
+        same = [
+            all(row["failure_pct"] == default.loc[row["method"], "failure_pct"] for _, row in part.iterrows())
+            and all(row["delay_s"] == default.loc[row["method"], "delay_s"] for _, row in part.iterrows())
+            for _, part in ((value, cells[cells["value"] == value]) for value in table.index)
+        ]
+        lines += [f"**{scenario}** (n = {int(default['n'].max())})", ""]
+        lines += [f"| {name.rpartition('.')[2]} | " + " | ".join(methods) + " |", "|---" * (len(methods) + 1) + "|"]
+        for value, is_default in zip(table.index, same, strict=True):
+            shown = f"**{value}**" if is_default else value
+            lines.append(f"| {shown} | " + " | ".join(table.loc[value, methods]) + " |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def cell(row: pd.Series) -> str:
+    """Failure rate, and the share of hosts that never arrived."""
+    missed = row["host_not_reached"] / (row["n"] + row["censored"])
+    return f"{row['failure_pct']:.1f}" + (f" ({100 * missed:.1f})" if missed else "")
+
+
+if __name__ == "__main__":
+    main()
