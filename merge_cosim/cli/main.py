@@ -132,6 +132,26 @@ def run(
 
 
 @app.command()
+def export(
+    scenario: Annotated[str, typer.Argument(help="Shipped scenario or scenario file.")],
+    case: Annotated[str, typer.Option(help="Case, as in the column 'case' of results.parquet.")],
+    out: Annotated[Path, typer.Option(help="Folder to write to.")],
+    set_: Sets = None,
+    data: Data = None,
+    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+) -> None:
+    """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us."""
+    from merge_cosim.experiments.methods import parse_setting
+    from merge_cosim.experiments.single import export_case
+    from merge_cosim.experiments.sweep import SweepRequest
+    from merge_cosim.ngsim.data import find_data
+
+    settings = dict(map(parse_setting, set_ or ()))
+    request = SweepRequest([scenario], ["acc"], settings=settings, data=find_data(data), source=source)
+    typer.echo(export_case(request, case, out))
+
+
+@app.command()
 def train(
     out: Annotated[Path, typer.Option(help="Model file to write (.json).")],
     data: Data = None,

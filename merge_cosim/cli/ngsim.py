@@ -128,10 +128,13 @@ def surrogate(
     from merge_cosim.ngsim.sites import site as find_site
     from merge_cosim.traffic.surrogate import export
 
-    written = {each.name: export(each, out) for each in ([find_site(site)] if site else SITES)}
+    files = {each.name: export(each, out) for each in ([find_site(site)] if site else SITES)}
+    written = [
+        {"site": name, "file": str(path), "rows": pq.read_metadata(path).num_rows, "source": "surrogate"}
+        for name, path in files.items()
+    ]
     if as_json:
-        rows = {name: pq.read_metadata(path).num_rows for name, path in written.items()}
-        print(json.dumps([{"site": n, "file": str(p), "rows": rows[n], "source": "surrogate"} for n, p in written.items()]))
+        print(json.dumps(written, indent=2))
         return
-    for path in written.values():
-        print(f"wrote {path} (synthetic)")
+    for each in written:
+        print(f"wrote {each['file']}: {each['rows']:,} synthetic rows")

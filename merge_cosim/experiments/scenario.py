@@ -13,6 +13,7 @@ from merge_cosim.cosim.scoring import Rules
 from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
 from merge_cosim.ngsim.rules import PairRules
+from merge_cosim.ramps.route_reader import read_sumocfg
 from merge_cosim.registry import did_you_mean, parameters
 from merge_cosim.traffic.base import MergingCar, merging_cars
 
@@ -74,6 +75,17 @@ class Pairs(_Strict):
     rules: PairRules = PairRules()
 
 
+class Routes(_Strict):
+    """Cars of an ordinary SUMO configuration, by the roles of their types.
+
+    Attributes:
+        file: The `.sumocfg`.
+    """
+
+    kind: Literal["routes"]
+    file: Path
+
+
 class Scenario(_Strict):
     """A test: where, from which states, against whom, and how it is scored.
 
@@ -91,7 +103,7 @@ class Scenario(_Strict):
     title: str
     about: str = ""
     ramp: str
-    encounters: Annotated[Grid | Pairs, Field(discriminator="kind")]
+    encounters: Annotated[Grid | Pairs | Routes, Field(discriminator="kind")]
     merging: dict[str, Any]
     test: Rules = Rules()
     speed_limit: PositiveFloat | None = None
@@ -134,10 +146,7 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
         if file.suffix:
             raise UserError(f"{file}: no such scenario file")
         raise UserError(f"unknown scenario '{name_or_file}'{did_you_mean(name_or_file, scenario_names())}")
-    try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{file}: not a TOML file: {error}") from None
+    document = _of_sumocfg(file) if file.suffix == ".sumocfg" else _of_toml(file)
     for name, value in (settings or {}).items():
         _set(document, name, value)
     try:
@@ -146,6 +155,23 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
         raise UserError(f"{file}: {_first_problem(error)}") from None
     scenario.merging_car()
     return scenario
+
+
+def _of_toml(file: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{file}: not a TOML file: {error}") from None
+
+
+def _of_sumocfg(file: Path) -> dict[str, Any]:
+    ramp, _ = read_sumocfg(file)
+    return {
+        "title": f"Route files of {file.name}",
+        "ramp": str(ramp.net.parent),
+        "encounters": {"kind": "routes", "file": str(file)},
+        "merging": {"model": "designed"},
+    }
 
 
 def _set(document: dict[str, Any], name: str, value: Any) -> None:
@@ -169,7 +195,7 @@ _KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules]] =
 def _first_problem(error: ValidationError) -> str:
     first = min(error.errors(), key=lambda one: one["type"] == "missing")  # a misspelt key is missing, too
     *place, key = first["loc"]
-    shown = ".".join(str(part) for part in first["loc"] if part not in ("grid", "pairs", "[key]"))
+    shown = ".".join(str(part) for part in first["loc"] if part not in ("grid", "pairs", "routes", "[key]"))
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         section = _KNOWN.get(tuple(str(part) for part in place), Span)
         known = section.model_fields if issubclass(section, BaseModel) else parameters(section)

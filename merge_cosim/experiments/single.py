@@ -17,6 +17,7 @@ from merge_cosim.errors import UserError
 from merge_cosim.experiments.sweep import SweepRequest, plan
 from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.routes import write_encounter
 from merge_cosim.ramps.tiles import tile_id
 from merge_cosim.registry import did_you_mean
 
@@ -66,6 +67,12 @@ def trace_case(batch: Batch, gui_delay: int | None = None) -> tuple[dict[str, An
     finally:
         plant.close()
     return rows_of(batch, run, ramp).to_pylist()[0], pd.DataFrame(run.traces[0])
+
+
+def export_case(request: SweepRequest, case: str, out: Path) -> Path:
+    """Write one case of one scenario as SUMO files into a folder; returns the `.sumocfg`."""
+    batch = _case_alone(plan(request), case)
+    return write_encounter(out, Ramp.load(batch.scenario.ramp), batch.encounters, 0)
 
 
 def _open_window(options: SumoOptions) -> Session:

@@ -11,11 +11,12 @@ import numpy as np
 
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import Grid, Pairs, Scenario
+from merge_cosim.experiments.scenario import Grid, Pairs, Routes, Scenario
 from merge_cosim.ngsim.encounters import at_site_point, site_encounters
 from merge_cosim.ngsim.sites import site
 from merge_cosim.ngsim.split import split_cars
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.route_reader import read_sumocfg
 from merge_cosim.traffic.surrogate import surrogate_folder
 
 SourceChoice = Literal["ngsim", "surrogate"]
@@ -34,6 +35,8 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
     """
     if isinstance(scenario.encounters, Grid):
         return _grid(scenario.encounters)
+    if isinstance(scenario.encounters, Routes):
+        return read_sumocfg(scenario.encounters.file)[1]
     parts = [
         _part(pairs_of_site(name, scenario.encounters, data, source), scenario.encounters, part)
         for name, part in scenario.encounters.sites.items()

@@ -6,6 +6,7 @@ from pathlib import Path
 from lxml import etree
 
 from merge_cosim.encounter import Encounters
+from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.units import DT
 
@@ -22,7 +23,7 @@ COLORS = {"host": "40,160,60", "merging": "210,50,40"}
 
 
 def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) -> Path:
-    """Write net, routes and configuration of one encounter into a folder and return the `.sumocfg`.
+    """Write net, ramp, routes and configuration of one encounter into a folder and return the `.sumocfg`.
 
     Left alone, SUMO drives both cars by its own models; the initial state is the encounter's.
 
@@ -30,7 +31,8 @@ def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) 
         UserError: The encounter starts off the net.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(ramp.net, folder / ramp.net.name)
+    for file in (ramp.net, ramp.net.parent / FILE_NAME):
+        shutil.copyfile(file, folder / file.name)
     merge_position = float(encounters.merge_position[row])
     states = {
         "host": (encounters.host_station, encounters.host_speed, encounters.host_length),

@@ -1,0 +1,146 @@
+"""Ordinary SUMO route files as encounters: cars whose type carries the parameter `merge-cosim.role`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from lxml import etree
+
+from merge_cosim.encounter import Encounters, Intention
+from merge_cosim.errors import UserError
+from merge_cosim.ramps.definition import FILE_NAME
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.routes import MERGE_POSITION, ROLE
+
+ROLES = ("host", "merging")
+DEFAULT_LENGTH = 5.0
+"""Length of SUMO's default passenger car [m]."""
+
+
+@dataclass(frozen=True)
+class _Car:
+    name: str
+    edge: str
+    position: float
+    speed: float
+    length: float
+    merge_position: float | None
+
+
+def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
+    """Read the ramp and the encounters of a `.sumocfg`.
+
+    Its net must be that of a ramp (`ramp.toml` lies beside it). The k-th car with the role `host` meets the k-th with
+    the role `merging`, in the order of the route files; their start is given by departure edge, position and speed, as
+    numbers. Other cars are passed over.
+
+    Raises:
+        UserError: A file is missing or no XML, or a car cannot be understood.
+    """
+    root = _parse(file)
+    net = file.parent / _option(root, "net-file", file)
+    if not (net.parent / FILE_NAME).is_file():
+        raise UserError(f"{file}: no {FILE_NAME} beside its net {net}; start a ramp with: merge-cosim ramp new NAME")
+    ramp = Ramp.load(net.parent)
+    routes = [file.parent / name.strip() for name in _option(root, "route-files", file).split(",")]
+    cars: dict[str, list[_Car]] = {role: [] for role in ROLES}
+    for route_file in routes:
+        for role, car in _cars(route_file):
+            cars[role].append(car)
+    hosts, merging = cars["host"], cars["merging"]
+    if not hosts or len(hosts) != len(merging):
+        raise UserError(
+            f"{file}: {len(hosts)} cars with the role host and {len(merging)} with the role merging; each encounter "
+            f'needs one of both (<param key="{ROLE}" value="host"/> in the vType)'
+        )
+    n = len(hosts)
+    merge_position = np.array(
+        [ramp.merging_point if car.merge_position is None else car.merge_position for car in merging]
+    )
+    nothing = np.zeros(n, dtype=bool)
+    return ramp, Encounters(
+        case=np.array([f"{host.name}_{car.name}" for host, car in zip(hosts, merging, strict=True)]),
+        site=np.full(n, ramp.name),
+        source=np.full(n, "designed"),
+        car=np.full(n, ""),
+        host_station=_stations(ramp, hosts, merge_position, routes[0]),
+        host_speed=np.array([car.speed for car in hosts]),
+        host_length=np.array([car.length for car in hosts]),
+        merging_station=_stations(ramp, merging, merge_position, routes[0]),
+        merging_speed=np.array([car.speed for car in merging]),
+        merging_length=np.array([car.length for car in merging]),
+        merge_position=merge_position,
+        label=np.full(n, int(Intention.UNKNOWN)),
+        smoothed_source=nothing,
+        length_missing=nothing,
+    )
+
+
+def _stations(ramp: Ramp, cars: list[_Car], merge_position: np.ndarray, file: Path) -> np.ndarray:
+    stations = []
+    for car, merging_point in zip(cars, merge_position, strict=True):
+        try:
+            stations.append(ramp.station(car.edge, 0, car.position, float(merging_point)))
+        except ValueError as error:
+            raise UserError(f"{file}: vehicle '{car.name}': {error}") from None
+    return np.array(stations)
+
+
+def _cars(file: Path) -> Iterator[tuple[str, _Car]]:
+    root = _parse(file)
+    types = {kind.get("id", ""): kind for kind in root.iter("vType")}
+    routes = {route.get("id"): route.get("edges", "") for route in root.iter("route")}
+    for vehicle in root.iter("vehicle"):
+        kind = types.get(vehicle.get("type", ""))
+        parameters = {one.get("key"): one.get("value", "") for one in ([] if kind is None else kind.iter("param"))}
+        parameters |= {one.get("key"): one.get("value", "") for one in vehicle.iter("param")}
+        role = parameters.get(ROLE)
+        if kind is None or role is None:
+            continue
+        where = f"{file}:{vehicle.sourceline}: vehicle '{vehicle.get('id')}'"
+        if role not in ROLES:
+            raise UserError(f"{where}: {ROLE} is '{role}'; it must be {' or '.join(ROLES)}")
+        inner = vehicle.find("route")
+        edges = (inner.get("edges", "") if inner is not None else routes.get(vehicle.get("route"), "")).split()
+        if not edges:
+            raise UserError(f"{where}: it has no route")
+        merge_position = parameters.get(MERGE_POSITION)
+        yield (
+            role,
+            _Car(
+                name=vehicle.get("id", ""),
+                edge=edges[0],
+                position=_number(vehicle.get("departPos"), "departPos", where),
+                speed=_number(vehicle.get("departSpeed"), "departSpeed", where),
+                length=_number(kind.get("length", str(DEFAULT_LENGTH)), "length", where),
+                merge_position=None if merge_position is None else _number(merge_position, MERGE_POSITION, where),
+            ),
+        )
+
+
+def _number(text: str | None, name: str, where: str) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise UserError(f"{where}: {name} is '{text or ''}'; an encounter needs a number")
+    return float(value)
+
+
+def _option(root: etree._Element, name: str, file: Path) -> str:
+    for element in root.iter(name):
+        return str(element.get("value", ""))
+    raise UserError(f"{file}: no <{name} value=.../>")
+
+
+def _parse(file: Path) -> etree._Element:
+    try:
+        return etree.parse(str(file)).getroot()
+    except OSError:
+        raise UserError(f"{file}: no such file") from None
+    except etree.XMLSyntaxError as error:
+        raise UserError(f"{file}: not XML: {error}") from None
