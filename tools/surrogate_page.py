@@ -1,7 +1,7 @@
-"""Compare the surrogate with real NGSIM data and write docs/surrogate.md with its pictures."""
+"""Compare the surrogate with real NGSIM pairs: python tools/surrogate_page.py --data DIR writes docs/surrogate.md."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -10,66 +10,234 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import ks_2samp
+from sklearn.metrics import roc_auc_score
 
 from merge_cosim.encounter import Encounters, Intention
-from merge_cosim.ngsim.encounters import site_encounters
-from merge_cosim.ngsim.sites import SITES, Site
+from merge_cosim.ngsim.encounters import site_pairs
+from merge_cosim.ngsim.pairs import Paired
+from merge_cosim.ngsim.sites import SITES
+from merge_cosim.ngsim.summary import summarise
+from merge_cosim.traffic.recipe import RECIPES
 from merge_cosim.traffic.surrogate import surrogate_folder
 from merge_cosim.units import DT, FloatArray, time_to_arrival
 
-ROOT = Path(__file__).parent.parent
-BANDS = ((0, 40), (40, 70), (70, 110), (110, 500))
+DOCS = Path(__file__).parent.parent / "docs"
+BANDS = ((0, 40), (40, 70), (70, 110), (110, np.inf))
+"""Distances to the lane change [m] by which the ambiguity of the order is told apart."""
+QUANTILES = (5, 50, 95)
+COLORS = {"real": "0.15", "surrogate": "#d9480f"}
+Measure = Callable[[Encounters], FloatArray]
 
 
-def log_of(e: Encounters):
+def stations(e: Encounters, car: str) -> list[FloatArray]:
+    """Smoothed stations [m] of the `merging` or the `host` car of each pair, from the window's start to the change."""
     assert e.log is not None
-    return e.log
+    track = getattr(e.log, f"{car}_station")
+    return [track[row][: int(last) + 1] for row, last in enumerate(e.log.change_cycle)]
 
 
-def tracks(e: Encounters, which: str) -> list[FloatArray]:
-    """Stations [m] of one car of each pair from the window's start to the lane change."""
-    log = log_of(e)
-    track = log.merging_station if which == "merging" else log.host_station
-    return [track[i][: int(log.change_cycle[i]) + 1] for i in range(len(e))]
+def speed(car: str) -> Measure:
+    """Speeds [m/s] of every frame."""
+    return lambda e: np.concatenate([np.diff(s) / DT for s in stations(e, car)])
 
 
-def once(e: Encounters) -> np.ndarray:
-    return np.unique(e.car, return_index=True)[1]
+def acceleration(car: str) -> Measure:
+    """Accelerations [m/s^2] of every frame, of smoothed stations."""
+    return lambda e: np.concatenate([np.diff(s, n=2) / DT**2 for s in stations(e, car)])
 
 
-def speeds(which: str) -> Callable[[Encounters], FloatArray]:
-    return lambda e: np.concatenate([np.diff(s) / DT for s in tracks(e, which)])
-
-
-def accelerations(which: str) -> Callable[[Encounters], FloatArray]:
-    return lambda e: np.concatenate([np.diff(s, n=2) / DT**2 for s in tracks(e, which)])
-
-
-def arrivals(e: Encounters) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """T_m, T_h [s], distance of the merging car [m] and label in every frame with both before the merge."""
-    rows = []
-    for m, h, label in zip(tracks(e, "merging"), tracks(e, "host"), e.label, strict=True):
+def approach(e: Encounters) -> tuple[FloatArray, ...]:
+    """T_m [s], T_h [s], way left to the merging car [m] and label, of every frame with both ahead of the change."""
+    frames = []
+    for m, h, label in zip(stations(e, "merging"), stations(e, "host"), e.label, strict=True):
         both = (m[1:] < 0) & (h[1:] < 0)
         t_m, t_h = (time_to_arrival(s[1:], np.diff(s) / DT)[both] for s in (m, h))
-        rows.append((t_m, t_h, -m[1:][both], np.full(both.sum(), label)))
-    return tuple(np.concatenate(column) for column in zip(*rows, strict=True))
+        frames.append((t_m, t_h, -m[1:][both], np.full(int(both.sum()), float(label))))
+    return tuple(np.concatenate(column) for column in zip(*frames, strict=True))
 
 
-def at_change(label: Intention) -> Callable[[Encounters], FloatArray]:
-    return lambda e: np.abs([s[-1] for s in tracks(e, "host")])[e.label == label]
+def per_car(e: Encounters) -> Encounters:
+    """One pair of each merging car."""
+    return e.take(np.unique(e.car, return_index=True)[1])
 
 
-MEASURES: dict[str, Callable[[Encounters], FloatArray]] = {
-    "host speed [m/s]": speeds("host"),
-    "merging car's speed [m/s]": speeds("merging"),
-    "host acceleration [m/s²]": accelerations("host"),
-    "merging car's acceleration [m/s²]": accelerations("merging"),
-    "time to arrival T_m [s]": lambda e: arrivals(e)[0],
-    "time to arrival T_h [s]": lambda e: arrivals(e)[1],
-    "T_m − T_h [s]": lambda e: np.subtract(*arrivals(e)[:2]),
-    "lane change, past the gore [m]": lambda e: e.merge_position[once(e)],
-    "speed at the lane change [m/s]": lambda e: np.array([s[-1] - s[-2] for s in tracks(e, "merging")])[once(e)] / DT,
+def apart(label: Intention) -> Measure:
+    """Front-to-front distance [m] at the lane change to the hosts that passed first, or second."""
+    return lambda e: np.array([abs(s[-1]) for s in stations(e, "host")])[e.label == label]
+
+
+MEASURES: dict[str, Measure] = {
+    "host's speed [m/s]": speed("host"),
+    "merging car's speed [m/s]": speed("merging"),
+    "host's acceleration [m/s²]": acceleration("host"),
+    "merging car's acceleration [m/s²]": acceleration("merging"),
+    "time to arrival T_m [s]": lambda e: approach(e)[0],
+    "time to arrival T_h [s]": lambda e: approach(e)[1],
+    "T_m − T_h [s]": lambda e: np.subtract(*approach(e)[:2]),
     "merging distance in the window [m]": lambda e: -e.merging_station,
-    "to the car ahead at the change [m]": at_change(Intention.YIELD),
-    "to the car behind at the change [m]": at_change(Intention.NOT_YIELD),
+    "lane change, past the gore [m]": lambda e: per_car(e).merge_position,
+    "speed at the lane change [m/s]": lambda e: np.array([s[-1] - s[-2] for s in stations(per_car(e), "merging")]) / DT,
+    "to the car ahead at the change [m]": apart(Intention.YIELD),
+    "to the car behind at the change [m]": apart(Intention.NOT_YIELD),
 }
+
+
+def auc(e: Encounters) -> list[float]:
+    """How well T_h - T_m separates the labels in each of `BANDS`."""
+    t_m, t_h, left, label = approach(e)
+    bands = [(low <= left) & (left < high) for low, high in BANDS]
+    return [float(roc_auc_score(label[band], (t_h - t_m)[band])) for band in bands]
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table, numbers to the right."""
+    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def quantiles(values: FloatArray) -> str:
+    """The 5, 50 and 95 % quantiles."""
+    return " / ".join(f"{round(q, 1) + 0.0:.1f}" for q in np.percentile(values, QUANTILES))
+
+
+def aggregates(site: str, named: dict[str, Paired]) -> str:
+    """The data sets in numbers, the published ones first."""
+    rows = []
+    for name, paired in named.items():
+        facts = summarise(paired, site)
+        if not rows and (paper := facts.published):
+            rows.append(["published", str(paper.pairs), str(paper.merge_distance_m), str(paper.speed_m_s), "", ""])
+        rows.append(
+            [
+                name,
+                str(facts.pairs),
+                f"{facts.merge_distance_m:.1f}",
+                f"{facts.speed_m_s:.1f}",
+                f"{100 * facts.yielding:.0f} %",
+                f"{100 * len(paired.rejected.get('host_changes_lane', ())) / max(facts.pairs, 1):.0f} %",
+            ]
+        )
+    head = ("", "pairs", "L_merge [m]", "speed [m/s]", "yielding", "rejected: the host changes lane, of the pairs")
+    return table(head, rows)
+
+
+def comparison(named: dict[str, Encounters]) -> str:
+    """Quantiles of every measure, and Kolmogorov-Smirnov distances where there are two sets."""
+    rows = []
+    for title, measure in MEASURES.items():
+        values = [measure(e) for e in named.values()]
+        distance = [f"{ks_2samp(*values).statistic:.2f}"] if len(values) == 2 else []
+        rows.append([title, *map(quantiles, values), *distance])
+    head = ["5 / 50 / 95 %", *named, *(["KS distance"] if len(named) == 2 else [])]
+    return table(head, rows)
+
+
+def ambiguity(named: dict[str, Encounters]) -> str:
+    """AUC of T_h - T_m by distance."""
+    head = ["AUC", *(f"{low:g}-{high:g} m" if high < np.inf else f"over {low:g} m" for low, high in BANDS)]
+    return table(head, [[name, *(f"{value:.3f}" for value in auc(e))] for name, e in named.items()])
+
+
+def draw(named: dict[str, Encounters], target: Path) -> None:
+    """Histograms of every measure, one panel each."""
+    figure, panels = plt.subplots(3, 4, figsize=(12, 7.2), layout="constrained")
+    for panel, (title, measure) in zip(panels.flat, MEASURES.items(), strict=True):
+        values = {name: measure(e) for name, e in named.items()}
+        low, high = np.percentile(np.concatenate(list(values.values())), [0.5, 99.5])
+        bins = np.linspace(low, high, 31)
+        for name, each in values.items():
+            panel.hist(each, bins, density=True, histtype="step", linewidth=1.5, color=COLORS[name], label=name)
+        panel.set_xlabel(title)
+        panel.set_yticks([])
+        panel.spines[["top", "right", "left"]].set_visible(False)
+    panels.flat[0].legend(frameon=False, loc="upper left", fontsize="small")
+    figure.savefig(target, dpi=80)
+    plt.close(figure)
+
+
+def section(site: str, title: str, named: dict[str, Paired]) -> str:
+    """One site: tables and a picture."""
+    encounters = {name: paired.encounters for name, paired in named.items()}
+    draw(encounters, DOCS / "img" / f"surrogate-{site}.png")
+    return "\n\n".join(
+        [
+            f"## {title}",
+            aggregates(site, named),
+            f"![Distributions of the pairs of {title}](img/surrogate-{site}.png)",
+            comparison(encounters),
+            "How well the sign of T_h − T_m alone tells who goes first, by the merging car's way left to its change:",
+            ambiguity(encounters),
+        ]
+    )
+
+
+HEAD = """\
+# The surrogate
+
+Without NGSIM files the replay scenarios run on a *surrogate*: SUMO's own traffic on the same two ramps, written in
+NGSIM's columns and units and read by the same reader, with the same rules for pairs. Every row of a result and every
+heading says `surrogate` then. It stands in for the data so that everything can be tried and tested; it is no evidence
+about drivers.
+
+    merge-cosim ngsim surrogate --out DIR          # the files themselves; both sites take about a minute, once
+
+{minutes:.0f} minutes of traffic per site, in {recordings} recordings with a seed each: with one version of SUMO the
+same bytes every time. All drivers use SUMO's car-following model EIDM with its lane-change model LC2013; the on-ramp's
+cars come at even intervals, the others at random ones. The recipe (`merge_cosim/traffic/recipe.py`) was set by hand so
+that pairs, way to the lane change, speeds and the share of yielding come near the published figures (Dong, Dolan,
+Litkouhi 2017, Table I) and, on US-101, near the real pairs; no method was run on it.
+
+Made by `python tools/surrogate_page.py --data DIR` with the NGSIM files in `DIR`. 'Real' is what that folder held:
+{held}.
+Where these are fragments, not complete periods, their windows are cut short and their merging distance with them.
+Speeds and accelerations are those of the smoothed positions, by the same filter for both.
+"""
+
+TAIL = """\
+## Where it falls short
+
+- **Accelerations** of SUMO's cars are too smooth: most are near zero, with a peak at -2 m/s² where drivers brake for a
+  gap. Real cars' vary all the time, also after smoothing. Whatever reads speed transitions learns something cleaner
+  here than in real data.
+- **No measurement noise.** Positions are exact to NGSIM's last decimal; a filter has nothing to do. (NGSIM's own speeds
+  heap up at some values, which shows as a comb in the pictures.)
+- **Merging happens too early**: many of SUMO's drivers change lane as soon as they may, at the very start of the
+  auxiliary lane.
+- **Slow cars.** Some of SUMO's merging cars nearly stop before they find a gap, and hosts slow down for them. None of
+  the real ones at hand does.
+- **Gaps** at the lane change spread wider than the real ones.
+- **Bunches.** SUMO's merging cars often go in one behind the other without a host-lane car between them; such pairs are
+  rejected, because the 'host' itself has just changed lane. These are mostly hosts ahead, so the share of yielding is
+  below one half on US-101.
+- **The order is less plain** far from the lane change than in the real US-101 pairs (the AUC above).
+- **A driver's intention is SUMO's** lane-change model, a rule. Nothing of a negotiation between people is in it.
+- **I-80**: lane 7 changes its label at a fixed place in NGSIM's data, wherever a car is across the lane; in the
+  surrogate it changes where the car does, anywhere in the 85 m beside lane 6. From where the on-ramp is in view was
+  chosen to meet the published merging distance.
+- **Demand and speed limits** are the model's, chosen for the right speeds and gaps; they are not the site's counts.
+"""
+
+
+def main() -> None:
+    """Write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, required=True, help="folder with real NGSIM files")
+    data = parser.parse_args().data
+    (DOCS / "img").mkdir(parents=True, exist_ok=True)
+    parts, held = [], []
+    for site in SITES:
+        made = site_pairs(surrogate_folder(site), site, source="surrogate")
+        real = site_pairs(data, site)
+        assert made is not None
+        if real is not None:
+            held.append(f"{len(real.encounters)} pairs of {len(np.unique(real.encounters.car))} cars of {site.title}")
+        parts.append(section(site.name, site.title, ({"real": real} if real else {}) | {"surrogate": made}))
+    recipe = RECIPES["us101"]
+    recordings = len(recipe.seeds)
+    minutes = recordings * recipe.duration / 60
+    head = HEAD.format(minutes=minutes, recordings=recordings, held="; ".join(held) or "nothing")
+    (DOCS / "surrogate.md").write_text("\n\n".join([head.strip(), *parts, TAIL.strip()]) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

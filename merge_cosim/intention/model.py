@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from merge_cosim.encounter import Intention
 from merge_cosim.errors import UserError
@@ -70,7 +69,7 @@ class IntentionModel:
                 f"model {self.name}: no transitions for transition_lag {lag} (has {sorted(self.transitions)})"
             )
         counts = self.transitions[lag].astype(np.float64)
-        pooled = gaussian_filter(counts.sum(axis=0), sigma=1.0, mode="constant")
+        pooled = _blurred(counts.sum(axis=0))
         background = _normalised_rows(pooled)
         own = np.stack([_normalised_rows(count) for count in counts])
         seen = (counts.sum(axis=2) > 0).all(axis=0)[None, :, None]
@@ -82,7 +81,7 @@ class IntentionModel:
 
     def time_probabilities(self, uniform: float) -> FloatArray:
         """Return P(T_m, T_h | I), shape (2, TIME_BINS, TIME_BINS), smoothed by one bin and mixed with uniform."""
-        smooth = np.stack([gaussian_filter(one, sigma=1.0, mode="constant") for one in self.arrivals])
+        smooth = np.stack([_blurred(one) for one in self.arrivals])
         shares = smooth / smooth.sum(axis=(1, 2), keepdims=True)
         return (1.0 - uniform) * shares + uniform / shares[0].size
 
@@ -90,8 +89,8 @@ class IntentionModel:
         """Return `log P(T_m, T_h | N) - log P(T_m, T_h | Y)`, shape (TIME_BINS, TIME_BINS)."""
         return _log_ratio(self.time_probabilities(uniform))
 
-    def save(self, file: Path) -> None:
-        """Write the model as JSON, counts as sparse lists."""
+    def to_json(self) -> str:
+        """The model as text, one entry per line, counts as sparse lists."""
         document = {
             "schema": SCHEMA,
             "name": self.name,
@@ -107,7 +106,11 @@ class IntentionModel:
             "trained_on": list(self.trained_on),
         }
         rows = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in document.items())
-        file.write_text("{\n" + ",\n".join(rows) + "\n}\n", encoding="utf-8")
+        return "{\n" + ",\n".join(rows) + "\n}\n"
+
+    def save(self, file: Path) -> None:
+        """Write the model's file."""
+        file.write_text(self.to_json(), encoding="utf-8")
 
     @classmethod
     def load(cls, name: str | Path) -> IntentionModel:
@@ -154,6 +157,12 @@ def speed_bin(speed: FloatArray) -> IntArray:
 def time_bin(time: FloatArray) -> IntArray:
     """Index of each time to arrival's bin; times beyond the table fall into its last bin."""
     return np.minimum(time / TIME_BIN, TIME_BINS - 1).astype(np.int64)
+
+
+def _blurred(counts: FloatArray) -> FloatArray:
+    from scipy.ndimage import gaussian_filter  # imported where a model is used: it is slow to import
+
+    return gaussian_filter(counts, sigma=1.0, mode="constant")
 
 
 def _normalised_rows(counts: FloatArray) -> FloatArray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping
 from typing import Any
 
 import matplotlib as mpl
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = 5.4, 3.4
 """Size of a single panel [in]: half a page's width on a desk, all of it on a phone."""
-STYLE: Mapping[str, Any] = {
+STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlesize": 9.0,
     "axes.spines.top": False,
@@ -32,7 +31,7 @@ FAILED = "#c1121f"
 
 def style() -> Any:
     """Context in which a figure is made."""
-    return mpl.rc_context(dict(STYLE))
+    return mpl.rc_context(STYLE)
 
 
 def panel(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Any]:

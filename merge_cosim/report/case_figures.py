@@ -19,6 +19,9 @@ MOST_LOG_ODDS = 12.0
 MARGIN_S = 1.0
 """Time drawn after the last host that arrived was scored [s]."""
 NAMES_IN_LABEL = 3
+MERGING = "#111111"
+DASHES = (0, (5, 2.5))
+"""Line style of merging cars."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +78,10 @@ def log_odds_figure(traces: pd.DataFrame, looks: Mapping[str, Look]) -> Figure |
             axes.plot(trace["time_s"], odds, color=looks[method].color, ls=looks[method].line, label=method)
         if not drawn:
             return None
-        axes.axhline(0.0, color="#444444", lw=0.9, ls="--")
+        axes.axhline(0.0, color="#777777", lw=0.8, ls=(0, (2, 2)))
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, -1.0), max(high, 1.0))
-        axes.text(1.0, 0.01, "host goes first ", transform=axes.transAxes, ha="right", va="bottom", color="#555555")
-        axes.text(1.0, 0.99, "host follows ", transform=axes.transAxes, ha="right", va="top", color="#555555")
-        axes.set(xlabel="time [s]", ylabel="log P(not yield) − log P(yield)")
+        axes.set(xlabel="time [s]", ylabel="log P(not yield) − log P(yield)\n< 0: host goes first, ≥ 0: it follows")
         _legend(figure)
     return figure
 
@@ -94,17 +95,16 @@ def _draw(paths: list[_Path], looks: Mapping[str, Look], quantity: str, label: s
             look, trace = looks[path.methods[0]], path.trace[path.trace["time_s"] <= end]
             axes.plot(trace["time_s"], trace[f"host_{quantity}"], color=look.color, ls=look.line, label=path.label)
             if shared is None:
-                axes.plot(trace["time_s"], trace[f"merging_{quantity}"], color=look.color, lw=0.9, ls=(0, (4, 2)))
+                axes.plot(trace["time_s"], trace[f"merging_{quantity}"], color=look.color, lw=0.9, ls=DASHES)
             if path.failed:
                 last = trace.iloc[-1]
                 axes.plot(last["time_s"], last[f"host_{quantity}"], "x", color=look.color, ms=9, mew=2.2, zorder=5)
         if shared is not None:
             trace = shared[shared["time_s"] <= end]
-            axes.plot(trace["time_s"], trace[f"merging_{quantity}"], color="#c1121f", lw=1.2, ls=(0, (4, 2)))
-        color = "#c1121f" if shared is not None else "#444444"
-        axes.plot([], [], color=color, lw=1.1, ls=(0, (4, 2)), label="merging car")
+            axes.plot(trace["time_s"], trace[f"merging_{quantity}"], color=MERGING, lw=1.3, ls=DASHES)
+        axes.plot([], [], color=MERGING, lw=1.1, ls=DASHES, label="merging car")
         if quantity == "station_m":
-            axes.axhline(0.0, color="#444444", lw=0.9, ls="--")
+            axes.axhline(0.0, color="#777777", lw=0.8, ls=(0, (2, 2)))
         axes.set(xlabel="time [s]", ylabel=label)
         axes.set_xlim(0.0, end * 1.02)
         _legend(figure)

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 MISSING = "–"
+LATEX_SIGNS = {"−": "$-$", "–": "--", "µ": r"$\mu$", "≥": r"$\geq$", "²": "$^2$"}
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,8 @@ class Column:
             return MISSING
         if self.decimals is None:
             return str(value)
-        return f"{float(value):,.{self.decimals}f}".replace("-", "−") if value else f"{0:.{self.decimals}f}"
+        rounded = round(float(value), self.decimals) + 0.0  # no minus before a zero
+        return f"{rounded:,.{self.decimals}f}".replace("-", "−")
 
 
 @dataclass(frozen=True)
@@ -82,5 +84,10 @@ class Table:
         if not any(column.group for column in self.columns):
             frame.columns = keys.get_level_values(1)
         form = "".join("l" if column.decimals is None else "r" for column in self.columns)
-        text: str = frame.to_latex(index=False, escape=True, column_format=form, caption=self.title)
-        return text.replace("−", "$-$").replace("–", "--").replace("µ", r"\textmu ").replace("≥", r"$\geq$")
+        caption = self.title.replace("_", r"\_")
+        text: str = frame.to_latex(
+            index=False, escape=True, column_format=form, multicolumn_format="c", caption=caption
+        )
+        for sign, command in LATEX_SIGNS.items():
+            text = text.replace(sign, command)
+        return text

@@ -11,15 +11,18 @@ from matplotlib.figure import Figure
 
 from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look, in_order
-from merge_cosim.report.tables import AMBIGUITY_EDGES, values_in_order
+from merge_cosim.report.tables import ALL_SITES, AMBIGUITY_EDGES
 from merge_cosim.units import FloatArray
 
 GRID_CASE = r"^d(?P<offset>[+-][\d.]+)_h(?P<host>[\d.]+)_m(?P<merging>[\d.]+)$"
 """Name of a grid's case: the host's offset [m] and both initial speeds [m/s]."""
 CELL = (1.8, 1.9)
-SHOWN_DELAYS = 0.98
-"""Share of the delays inside the axes; the rest is drawn at the upper edge."""
-MOST_NUMBERS = 8
+SHOWN = 0.95
+"""Share of the cases inside the axes, of those in which the host arrived; the rest is drawn at the edges."""
+LEAST_RANGE = 1.0
+"""Smallest range of the delays [s]."""
+MOST_NUMBERS = 24
+"""Most bars that carry their number."""
 
 
 def failure_map(results: pd.DataFrame) -> Figure:
@@ -57,16 +60,16 @@ def failure_map(results: pd.DataFrame) -> Figure:
 def ambiguity_figure(results: pd.DataFrame, looks: Mapping[str, Look]) -> Figure:
     """Delay of each case against how ambiguous its start was, one small panel per method; failures as crosses."""
     methods = in_order(results["method"])
-    usual = results[results["method"] != "always-brake"]["delay_s"]
-    top = float(usual.quantile(SHOWN_DELAYS)) if len(usual) else float(results["delay_s"].max())
-    top = max(top * 1.1, 1.0)
+    usual = results[results["host_reached"]]
+    top = max(1.1 * float(usual["delay_s"].quantile(SHOWN)), LEAST_RANGE) if len(usual) else LEAST_RANGE
+    right = max(float(results["ambiguity_s"].quantile(SHOWN)), AMBIGUITY_EDGES[-2]) * 1.1
     with canvas.style():
         figure, axes = canvas.grid_of(len(methods), 4, CELL)
         for ax, method in zip(axes, methods, strict=True):
             rows = results[results["method"] == method]
             failed = rows["failed"].to_numpy(dtype=bool)
-            x, y = rows["ambiguity_s"].to_numpy(), rows["delay_s"].clip(upper=top).to_numpy()
-            beyond = rows["delay_s"].to_numpy() > top
+            x, y = rows["ambiguity_s"].clip(upper=right).to_numpy(), rows["delay_s"].clip(upper=top).to_numpy()
+            beyond = (rows["delay_s"].to_numpy() > top) | (rows["ambiguity_s"].to_numpy() > right)
             color = looks[method].color
             ax.scatter(x[~failed & ~beyond], y[~failed & ~beyond], s=7, color=color, alpha=0.45, linewidths=0)
             ax.scatter(x[~failed & beyond], y[~failed & beyond], s=12, marker="^", color=color, alpha=0.45, lw=0)
@@ -74,9 +77,9 @@ def ambiguity_figure(results: pd.DataFrame, looks: Mapping[str, Look]) -> Figure
             for edge in AMBIGUITY_EDGES[1:-1]:
                 ax.axvline(edge, color="#bbbbbb", lw=0.8, zorder=0)
             ax.set_title(method)
-        axes[0].set_xlim(left=0.0)
+        axes[0].set_xlim(0.0, right * 1.04)
         axes[0].set_ylim(top=top * 1.06)
-        figure.supxlabel("|T_m − T_h| at the start [s]", fontsize=9)
+        figure.supxlabel("$|T_m - T_h|$ at the start [s]", fontsize=9)
         figure.supylabel("delay [s]", fontsize=9)
     return figure
 
@@ -92,8 +95,8 @@ def variation_figure(summary: pd.DataFrame, parameter: str, looks: Mapping[str, 
     """
     rows = summary.assign(value=summary["variation"].str.partition("=")[2])
     varied = rows[summary["variation"].str.startswith(f"{parameter}=")]
-    parts = list(varied.groupby(["source", "site"]))
-    values = values_in_order(varied["value"])
+    parts = sorted(varied.groupby(["source", "site"]), key=lambda part: (part[0][0], part[0][1] == ALL_SITES, part[0]))
+    values = varied["value"].drop_duplicates().tolist()
     numbers = pd.to_numeric(pd.Series(values), errors="coerce")
     is_scale = bool(numbers.notna().all()) and len(values) > 1
     with canvas.style():
@@ -108,7 +111,7 @@ def variation_figure(summary: pd.DataFrame, parameter: str, looks: Mapping[str, 
                 look = looks[method]
                 if is_scale:
                     x = numbers.to_numpy(dtype=float)
-                    ax.plot(x, rate, "o-", ms=4, color=look.color, label=method)
+                    ax.plot(x, rate, look.line, marker="o", ms=4, color=look.color, label=method)
                     ax.fill_between(x, low, high, color=look.color, alpha=0.12, lw=0)
                     for level in base.loc[base["method"] == method, "failure_pct"].dropna():
                         ax.axhline(level, color=look.color, lw=1.0, ls=":")
@@ -118,7 +121,8 @@ def variation_figure(summary: pd.DataFrame, parameter: str, looks: Mapping[str, 
                 ax.set_xticks(np.arange(len(values)), values)
                 ax.grid(axis="x", visible=False)
             ax.set_title(f"{site} ({source})" if len(parts) > 1 else "")
-            ax.set(xlabel=parameter, ylim=(0.0, None))
+            ax.set_xlabel(parameter)
+        axes[0].set_ylim(bottom=0.0)
         axes[0].set_ylabel("failures [%]")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4)
@@ -131,7 +135,7 @@ def _bars(ax: Any, i: int, n: int, rate: FloatArray, low: FloatArray, high: Floa
     ax.bar(x, rate, 0.92 * width, color=look.color, label=name)
     if np.isfinite(low).any():
         ax.errorbar(x, rate, [rate - low, high - rate], fmt="none", ecolor="#333333", elinewidth=0.8, capsize=2)
-    elif n * len(rate) <= MOST_NUMBERS * 3:
+    elif n * len(rate) <= MOST_NUMBERS:
         for place, height in zip(x, rate, strict=True):
             ax.annotate(f"{height:.1f}", (place, height), (0, 1), textcoords="offset points", ha="center", fontsize=7)
 

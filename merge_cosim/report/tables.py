@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,7 +26,7 @@ MAIN = (
     Column("failures", "count", 0, "failures"),
     Column("failure_pct", "%", 2, "failures"),
     Column("interval_pct", "95 % interval", None, "failures"),
-    Column("failure_pct_own", "% but rear-ended", 2, "failures"),
+    Column("failure_pct_own", "% without rear-end hits", 2, "failures"),
     Column("censored", "censored", 0, "failures"),
     Column("bounds_pct", "% best–worst", None, "failures"),
     Column("published_failure_pct", "%", 1, "published"),
@@ -35,13 +37,15 @@ MAIN = (
     Column("gap_m", "gap m", 1, "host at the merging point"),
     Column("delay_s", "delay s", 2, "cost"),
     Column("hardest_braking", "brake m/s²", 2, "cost"),
-    Column("hardest_braking_p95", "brake 95 %", 2, "cost"),
+    Column("hardest_braking_p95", "brake 95 % m/s²", 2, "cost"),
     Column("unnecessary_yields", "needless yields", 0, "cost"),
     Column("decision_flips", "flips", 2, "decision"),
     Column("correct_at_merge_pct", "correct %", 1, "decision"),
     Column("cycle_us", "batch", 2, "cycle µs"),
     Column("cycle_us_single", "alone", 1, "cycle µs"),
 )
+NOT_VARIED = ("published", "decision", "cycle µs")
+"""Groups of columns that the tables of varied parameters leave out."""
 
 
 @dataclass(frozen=True)
@@ -60,22 +64,28 @@ class Section:
         return frame[chosen]
 
 
-def summary_frame(rows: list[dict[str, Any]]) -> pd.DataFrame:
-    """The summary's rows as a DataFrame, missing values NaN, with the columns that only a reader needs."""
+def summary_frame(rows: list[dict[str, Any]], variations: Sequence[str] = ()) -> pd.DataFrame:
+    """The summary's rows as a DataFrame, missing values NaN, with the columns that only a reader needs.
+
+    Args:
+        rows: Summary rows.
+        variations: The labels `parameter=value` in the order in which the user gave them.
+    """
     frame = pd.DataFrame(rows)
     figures = [published(row["scenario"], row["method"]) for row in rows]
     frame["published_failure_pct"] = [figure.failure_pct if figure else np.nan for figure in figures]
-    frame["published_distance_m"] = pd.Series([figure.distance_m if figure else None for figure in figures], dtype=float)
+    frame["published_distance_m"] = pd.Series(
+        [figure.distance_m if figure else None for figure in figures], dtype=float
+    )
     frame["interval_pct"] = _ranges(frame["ci_low_pct"], frame["ci_high_pct"])
     censored = frame["censored"] > 0
-    frame["bounds_pct"] = _ranges(
-        frame["failure_pct_best"].where(censored), frame["failure_pct_worst"].where(censored)
-    )
+    frame["bounds_pct"] = _ranges(frame["failure_pct_best"].where(censored), frame["failure_pct_worst"].where(censored))
     differs = frame["failure_pct_own"].ne(frame["failure_pct"]) & frame["failure_pct"].notna()
     if not differs.any():
         frame["failure_pct_own"] = np.nan
     frame["order"] = frame["method"].map({method: i for i, method in enumerate(in_order(frame["method"]))})
-    return frame.sort_values(["scenario", "variation", "source", "site", "order"], kind="stable", ignore_index=True)
+    frame["place"] = frame["variation"].map({label: i for i, label in enumerate(["", *variations])})
+    return frame.sort_values(["scenario", "place", "source", "site", "order"], kind="stable", ignore_index=True)
 
 
 def sections(summary: pd.DataFrame) -> list[Section]:
@@ -96,14 +106,17 @@ def strata_table(results: pd.DataFrame, section: Section) -> Table:
     rows = section.of(results)
     rows = rows[~rows["censored"]]
     columns, parts = [METHOD], {}
-    for low, high in zip(AMBIGUITY_EDGES, AMBIGUITY_EDGES[1:], strict=False):
+    for low, high in pairwise(AMBIGUITY_EDGES):
         name = f"[{low:g}, {high:g}) s" if np.isfinite(high) else f"≥ {low:g} s"
         key = f"{low:g}_{high:g}s"
         parts[key] = rows[(rows["ambiguity_s"] >= low) & (rows["ambiguity_s"] < high)]
         columns += [Column(f"n_{key}", "n", 0, name), Column(f"failure_pct_{key}", "%", 2, name)]
     if rows["extended"].any():
         parts["logged"] = rows[~rows["extended"]]
-        columns += [Column("n_logged", "n", 0, "within the log"), Column("failure_pct_logged", "%", 2, "within the log")]
+        columns += [
+            Column("n_logged", "n", 0, "within the log"),
+            Column("failure_pct_logged", "%", 2, "within the log"),
+        ]
     methods = in_order(rows["method"])
     data = pd.DataFrame({"method": methods})
     for key, part in parts.items():
@@ -114,18 +127,15 @@ def strata_table(results: pd.DataFrame, section: Section) -> Table:
     return Table.of(data, columns, list(map(is_reference, methods)), title)
 
 
-def variation_table(summary: pd.DataFrame, scenario: str, parameter: str) -> Table | None:
-    """All values of a varied parameter, with the unvaried runs first; None if the scenario was not varied so."""
+def variation_table(summary: pd.DataFrame, scenario: str, parameter: str) -> Table:
+    """All values of a varied parameter, with the unvaried runs first."""
     rows = summary[(summary["scenario"] == scenario)].copy()
     rows[["parameter", "value"]] = rows["variation"].str.partition("=")[[0, 2]]
     varied = rows[rows["parameter"] == parameter]
-    if varied.empty:
-        return None
     base = rows[(rows["variation"] == "") & rows["method"].isin(varied["method"])].assign(value="as it stands")
     rows = pd.concat([base, varied])
-    rows["place"] = rows["value"].map({value: i for i, value in enumerate(values_in_order(rows["value"]))})
     rows = rows.sort_values(["source", "site", "order", "place"], kind="stable")
-    columns = [METHOD, Column("value", parameter), *MAIN[1:-4]]
+    columns = [METHOD, Column("value", parameter), *(column for column in MAIN[1:] if column.group not in NOT_VARIED)]
     many = [name for name in ("site", "source") if rows[name].nunique() > 1]
     columns[1:1] = [Column(name, name) for name in many]
     return Table.of(rows, columns, list(map(is_reference, rows["method"])), f"{scenario}: {parameter} varied")
@@ -133,16 +143,8 @@ def variation_table(summary: pd.DataFrame, scenario: str, parameter: str) -> Tab
 
 def varied_parameters(summary: pd.DataFrame) -> list[tuple[str, str]]:
     """Scenario and name of each varied parameter."""
-    rows = summary[summary["variation"] != ""]
-    pairs = zip(rows["scenario"], rows["variation"].str.partition("=")[0], strict=True)
-    return list(dict.fromkeys(pairs))
-
-
-def values_in_order(values: pd.Series) -> list[str]:
-    """Distinct values: text as it comes, then numbers by size."""
-    numbers = pd.to_numeric(values, errors="coerce")
-    texts = values[numbers.isna()].drop_duplicates().tolist()
-    return texts + values[numbers.notna()].loc[numbers.dropna().sort_values().index].drop_duplicates().tolist()
+    rows = zip(summary["scenario"], summary["variation"], strict=True)
+    return list(dict.fromkeys((scenario, variation.partition("=")[0]) for scenario, variation in rows if variation))
 
 
 def runs_in_sumo(results: pd.DataFrame) -> pd.DataFrame:

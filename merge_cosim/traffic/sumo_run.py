@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-import numpy as np
 import sumolib
 from lxml import etree
 
@@ -13,6 +12,8 @@ from merge_cosim.errors import UserError
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.traffic.recipe import Recipe
 from merge_cosim.units import DT
+
+_FILES = {"routes": "rou.xml", "signs": "add.xml", "edges": "txt", "fcd": "parquet"}
 
 HOUR = 3600.0
 """Seconds per hour."""
@@ -38,7 +39,7 @@ def simulate(recipe: Recipe, ramp: Ramp, seed: int, end: float, folder: Path) ->
         UserError: SUMO fails.
     """
     lanes = _lanes(ramp)
-    files = {name: folder / f"{name}-{seed}.{kind}" for name, kind in _FILES.items()}
+    files = {name: folder / f"{name}.{kind}" for name, kind in _FILES.items()}
     _write(files["routes"], _routes(recipe, ramp, end + RUN_OUT))
     _write(files["signs"], _signs(recipe, ramp, lanes))
     files["edges"].write_text("".join(f"edge:{edge}\n" for edge in lanes))
@@ -60,16 +61,12 @@ def simulate(recipe: Recipe, ramp: Ramp, seed: int, end: float, folder: Path) ->
         "fcd-output.filter-edges.input-file": files["edges"],
         "fcd-output.skip-empty": "true",
         "device.fcd.begin": recipe.warm_up,
-        "precision": 4,
     }
-    command = [sumolib.checkBinary("sumo"), *(word for key, value in options.items() for word in (f"--{key}", str(value)))]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    words = [word for key, value in options.items() for word in (f"--{key}", str(value))]
+    done = subprocess.run([sumolib.checkBinary("sumo"), *words], capture_output=True, text=True, check=False)
     if done.returncode or not files["fcd"].is_file():
         raise UserError(f"{ramp.net}: SUMO fails on it: {(done.stderr.strip() or 'no reason given').splitlines()[0]}")
     return files["fcd"]
-
-
-_FILES = {"routes": "rou.xml", "signs": "add.xml", "edges": "txt", "fcd": "parquet"}
 
 
 def _lanes(ramp: Ramp) -> dict[str, list[str]]:
@@ -132,19 +129,12 @@ def _routes(recipe: Recipe, ramp: Ramp, end: float) -> etree._Element:
 
 
 def _signs(recipe: Recipe, ramp: Ramp, lanes: dict[str, list[str]]) -> etree._Element:
-    """Variable speed signs in place of the net's speed limits."""
-    end = recipe.warm_up + recipe.duration
-    slow = np.arange(recipe.waves, end, recipe.waves) if recipe.waves else np.empty(0)
+    """Speed signs in place of the net's speed limits."""
     root = etree.Element("additional")
     for edge, along in lanes.items():
         for lane in along:
-            speed = _limit(recipe, ramp, edge, lane)
-            steps = [(0.0, speed)]
-            if edge == ramp.main[-1].edge:
-                steps += [step for t in slow for step in ((t, recipe.wave_speed), (t + recipe.wave_time, speed))]
             sign = etree.SubElement(root, "variableSpeedSign", id=lane, lanes=lane)
-            for time, limit in steps:
-                etree.SubElement(sign, "step", time=repr(float(time)), speed=repr(limit))
+            etree.SubElement(sign, "step", time="0", speed=repr(_limit(recipe, ramp, edge, lane)))
     return root
 
 

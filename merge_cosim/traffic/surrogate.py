@@ -1,4 +1,4 @@
-"""The surrogate: SUMO's own traffic at an NGSIM site, in NGSIM's format, so that everything works without a download."""
+"""The surrogate: SUMO's own traffic at an NGSIM site, in NGSIM's format: everything works without a download."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from merge_cosim.errors import UserError
 from merge_cosim.files import cache_folder
-from merge_cosim.ngsim.sites import Site, site
+from merge_cosim.ngsim.sites import Site
+from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.traffic.ngsim_format import ngsim_rows
@@ -61,14 +63,14 @@ def generate(recipe: Recipe, ramp: Ramp, target: Path) -> None:
     Raises:
         UserError: SUMO fails.
     """
-    where = site(recipe.site)
+    site = find_site(recipe.site)
     assert ramp.ngsim is not None
-    end = where.length - ramp.ngsim.gore_local_y
+    end = site.length - ramp.ngsim.gore_local_y
 
     def record(recording: int) -> pa.Table:
         with tempfile.TemporaryDirectory() as scratch:
             run = simulate(recipe, ramp, recipe.seeds[recording], end, Path(scratch))
-            return ngsim_rows(run, recipe, ramp, where, recording)
+            return ngsim_rows(run, recipe, ramp, site, recording)
 
     with ThreadPoolExecutor(PROCESSES) as pool:
         table = pa.concat_tables(pool.map(record, range(len(recipe.seeds))))
@@ -76,6 +78,20 @@ def generate(recipe: Recipe, ramp: Ramp, target: Path) -> None:
     source = pa.array([f"surrogate: SUMO {version('eclipse-sumo')}"] * table.num_rows)
     table = table.append_column("source", source).append_column("smoothed", raw)
     pq.write_table(table, target, compression="zstd")
+
+
+def export(site: Site, out: Path) -> Path:
+    """Copy the file of `surrogate_folder` to the folder `out`, made where it is missing, and return the copy.
+
+    Raises:
+        UserError: The folder cannot be written to.
+    """
+    (made,) = surrogate_folder(site).iterdir()
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        return Path(shutil.copy(made, out))
+    except OSError as error:
+        raise UserError(f"{out}: cannot be written to ({error.strerror}); name another folder with --out") from None
 
 
 def _key(recipe: Recipe, ramp: Ramp) -> str:

@@ -11,13 +11,40 @@ import pyarrow.parquet as pq
 import pytest
 from command import merge_cosim, small_scenario, summary
 
-CONTRACT = (
-    "scenario source case method failed failure_kind censored host_reached host_first label distance_m gap_m min_gap_m "
-    "min_ttc_s delay_s hardest_braking decision_flips correct_at_merge"
-).split()
-SUMMARY_CONTRACT = (
-    "scenario source method n failures failure_pct ci_low_pct ci_high_pct distance_m delay_s cycle_us cycle_us_single"
-).split()
+CONTRACT = [
+    "scenario",
+    "source",
+    "case",
+    "method",
+    "failed",
+    "failure_kind",
+    "censored",
+    "host_reached",
+    "host_first",
+    "label",
+    "distance_m",
+    "gap_m",
+    "min_gap_m",
+    "min_ttc_s",
+    "delay_s",
+    "hardest_braking",
+    "decision_flips",
+    "correct_at_merge",
+]
+SUMMARY_CONTRACT = [
+    "scenario",
+    "source",
+    "method",
+    "n",
+    "failures",
+    "failure_pct",
+    "ci_low_pct",
+    "ci_high_pct",
+    "distance_m",
+    "delay_s",
+    "cycle_us",
+    "cycle_us_single",
+]
 
 
 def test_a_sweep_writes_the_promised_files(tmp_path):
@@ -43,7 +70,9 @@ def test_a_sweep_writes_the_promised_files(tmp_path):
     assert manifest["worst_station_difference_m"] < 1e-6
     assert not (tmp_path / "out/parts").exists()
     best = summary(tmp_path / "out")["oracle-best"]
-    assert best["failures"] <= min(summary(tmp_path / "out")[name]["failures"] for name in ("always-go", "always-yield"))
+    assert best["failures"] <= min(
+        summary(tmp_path / "out")[name]["failures"] for name in ("always-go", "always-yield")
+    )
 
 
 def test_one_process_or_two_give_the_same_bytes(tmp_path):

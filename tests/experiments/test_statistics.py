@@ -89,7 +89,9 @@ def test_unnecessary_yields_need_a_safe_first_passage_of_always_go():
     summary = summarise(rows, {}).set_index("method")
     assert summary.loc["m", "unnecessary_yields"] == 1
     assert summary.loc["always-go", "unnecessary_yields"] == 0
-    alone = summarise(table({"case": "x", "method": "m"}, {"case": "y", "method": "m", "host_first": False}), {}).iloc[0]
+    alone = summarise(table({"case": "x", "method": "m"}, {"case": "y", "method": "m", "host_first": False}), {}).iloc[
+        0
+    ]
     assert pd.isna(alone["unnecessary_yields"])
 
 

@@ -20,7 +20,9 @@ ROUTES = """<routes>
   <vehicle id="bystander" type="other" route="through" depart="0"/>
 </routes>
 """
-CONFIG = """<configuration><input><net-file value="mine/designed.net.xml"/><route-files value="my.rou.xml"/></input></configuration>
+CONFIG = """<configuration>
+<input><net-file value="mine/designed.net.xml"/><route-files value="my.rou.xml"/></input>
+</configuration>
 """
 
 

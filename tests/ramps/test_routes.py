@@ -48,6 +48,7 @@ def test_the_folder_stands_alone(tmp_path: Path) -> None:
     assert sorted(p.name for p in config.parent.iterdir()) == [
         "encounter.rou.xml",
         "encounter.sumocfg",
+        "ramp.toml",
         "us101.net.xml",
         "view.xml",
     ]

@@ -1,0 +1,30 @@
+"""The tables of a report as files: CSV with plain column names, LaTeX with booktabs rules."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from merge_cosim.report.columns import Table
+
+FOLDER = "tables"
+
+
+def write_tables(folder: Path, tables: Mapping[str, Table]) -> list[Path]:
+    """Write each table as `tables/NAME.csv` and `tables/NAME.tex`; returns the files.
+
+    Args:
+        folder: Result folder.
+        tables: Tables by name.
+    """
+    target = folder / FOLDER
+    target.mkdir(exist_ok=True)
+    files = []
+    for name, table in tables.items():
+        stem = re.sub(r"[^\w.-]+", "-", name)
+        csv, tex = target / f"{stem}.csv", target / f"{stem}.tex"
+        table.data.to_csv(csv, index=False)
+        tex.write_text(table.latex(), encoding="utf-8")
+        files += [csv, tex]
+    return files

@@ -1,0 +1,88 @@
+"""Order, headings and numbers of the tables."""
+
+import pandas as pd
+import pytest
+
+from merge_cosim.experiments.store import SUMMARY_JSON, ResultFolder
+from merge_cosim.report.columns import Column, Table
+from merge_cosim.report.methods import COLORS, in_order, is_reference, looks
+from merge_cosim.report.published import published
+from merge_cosim.report.tables import Section, main_table, sections, strata_table, summary_frame, variation_table
+
+GRID = Section("designed-2", "designed", "designed")
+
+
+@pytest.fixture(scope="module")
+def summary(swept):
+    labels = ["merging.ahead=clear", "merging.ahead=any", "test.horizon=1", "test.horizon=3"]
+    return summary_frame(ResultFolder(swept).read_json(SUMMARY_JSON), labels)
+
+
+def test_methods_come_first_and_references_last():
+    mixed = ["oracle-best", "zeta", "pgm-time", "always-go", "fg-gmm", "pgm-g", "acc", "pgm", "slot+lqr"]
+    assert in_order(mixed) == [
+        "acc",
+        "slot+lqr",
+        "pgm-g",
+        "pgm",
+        "pgm-time",
+        "fg-gmm",
+        "zeta",
+        "always-go",
+        "oracle-best",
+    ]
+    assert is_reference("always-yield+acc")
+    assert not is_reference("alwaysgo")
+
+
+def test_a_method_keeps_its_colour():
+    assert looks(["pgm", "mine"])["pgm"] == looks(["acc", "pgm", "always-go"])["pgm"]
+    assert len(set(COLORS.values())) == len(COLORS)
+
+
+@pytest.mark.parametrize(
+    ("value", "decimals", "text"),
+    [(1234.567, 1, "1,234.6"), (-0.5, 2, "−0.50"), (0, 2, "0.00"), (-0.001, 2, "0.00"), (None, 1, "–"), (7, 0, "7")],
+)
+def test_numbers_as_text(value, decimals, text):
+    assert Column("x", "x", decimals).text(value) == text
+
+
+def test_a_column_without_values_is_left_out():
+    table = Table.of(
+        pd.DataFrame({"a": [1.0], "b": [None]}), [Column("a", "a", 0), Column("b", "b", 0)], [False], "T_1"
+    )
+    assert [column.name for column in table.columns] == ["a"]
+    assert r"\caption{T\_1}" in table.latex()
+
+
+def test_published_figures():
+    assert published("us101-replay", "pgm").failure_pct == 8.7
+    assert published("i80-replay", "acc").distance_m == 7.0
+    assert published("designed-1", "pgm-g").failure_pct == 0.9
+    assert published("designed-2", "always-go") is None
+
+
+def test_main_table(summary):
+    assert sections(summary) == [GRID]
+    table = main_table(summary, GRID)
+    assert table.apart == (False, False, False, True)
+    assert dict(table.groups)["published"] == 1  # Table II gives no D for the designed tests
+
+
+def test_strata_add_up(swept):
+    results = ResultFolder(swept).results().to_pandas()
+    data = strata_table(results, GRID).data
+    counts = data[["n_0_1s", "n_1_3s", "n_3_infs"]]
+    assert (counts.sum(axis=1) == 27).all()
+    plain = results[(results["method"] == "always-go") & (results["variation"] == "")]
+    sure = plain[plain["ambiguity_s"] < 1]
+    shown = data.set_index("method").loc["always-go", "failure_pct_0_1s"]
+    assert shown == pytest.approx(100 * sure["failed"].mean())
+
+
+def test_varied_values_keep_the_users_order(summary):
+    table = variation_table(summary, "designed-2", "merging.ahead").data
+    assert table["value"].tolist()[:3] == ["as it stands", "clear", "any"]
+    unvaried, clear = table[table["method"] == "always-go"]["failures"].tolist()[:2]
+    assert unvaried == clear
