@@ -33,7 +33,7 @@ Model = Annotated[str | None, typer.Option(help="Model file, or name of a model 
 Sets = Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, such as acc.headway=1.2 or test.horizon=5.")]
 Plugins = Annotated[list[Path] | None, typer.Option(help="Python file with components of your own.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
-Seed = Annotated[int, typer.Option(help="SUMO's seed.")]
+Seed = Annotated[int, typer.Option(help="Seed of SUMO and of every random stream.")]
 
 
 @app.command()

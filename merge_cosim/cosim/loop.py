@@ -15,6 +15,7 @@ from merge_cosim.cosim.scoring import Rules, Scorer
 from merge_cosim.encounter import NEVER, Encounters
 from merge_cosim.intention.base import Estimator
 from merge_cosim.observation import Observation, Setting
+from merge_cosim.streams import stream_keys
 from merge_cosim.traffic.base import MergingCar
 from merge_cosim.units import AnyArray, BoolArray, FloatArray, IntArray
 
@@ -83,6 +84,7 @@ def simulate(
     rules: Rules,
     setting: Setting,
     traced: Sequence[int] = (),
+    seed: int = 0,
 ) -> Run:
     """Run all encounters, `plant.count` at a time, each until it is scored, fails or times out.
 
@@ -97,8 +99,9 @@ def simulate(
         rules: When a case is scored.
         setting: Speed limit and cycle.
         traced: Indices of the cases to record cycle by cycle.
+        seed: Seed of the random streams, one per case.
     """
-    return _Loop(plant, encounters, driver, merging_car, rules, setting, frozenset(traced)).run()
+    return _Loop(plant, encounters, driver, merging_car, rules, setting, frozenset(traced), seed).run()
 
 
 class _Loop:
@@ -111,6 +114,7 @@ class _Loop:
         rules: Rules,
         setting: Setting,
         traced: frozenset[int],
+        seed: int,
     ) -> None:
         count, n = plant.count, len(encounters)
         self.plant, self.encounters, self.driver, self.merging_car = plant, encounters, driver, merging_car
@@ -122,6 +126,7 @@ class _Loop:
         driver.estimator.start(count, setting)
         driver.controller.start(count, setting)
         merging_car.start(encounters, count, setting)
+        self.keys = stream_keys(encounters.case, seed)
         self.case = np.full(count, -1)
         self.age = np.zeros(count, dtype=np.int64)
         self.score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
@@ -200,7 +205,7 @@ class _Loop:
         for plant in (self.plant, self.shadow):
             plant.place(rows, self.encounters, cases)
         self.merging_car.reset(rows, cases)
-        self.driver.estimator.reset(rows, self.encounters.label[cases])
+        self.driver.estimator.reset(rows, self.encounters.label[cases], self.keys[cases])
         self.driver.controller.reset(rows)
         self.scorer.reset(rows)
 

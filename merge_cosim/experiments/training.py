@@ -16,6 +16,7 @@ from merge_cosim.intention.model import IntentionModel
 from merge_cosim.intention.training import fit
 from merge_cosim.ngsim.split import split_cars
 from merge_cosim.observation import Observation, Setting
+from merge_cosim.streams import stream_keys
 from merge_cosim.units import DT, FloatArray
 
 DISTANCES = ((0.0, 40.0), (40.0, 70.0), (70.0, 110.0), (110.0, np.inf))
@@ -83,7 +84,7 @@ def judge(model: IntentionModel, held_out: Encounters) -> list[dict[str, Any]]:
     return rows
 
 
-def open_loop(estimator: Estimator, encounters: Encounters) -> tuple[FloatArray, FloatArray, FloatArray]:
+def open_loop(estimator: Estimator, encounters: Encounters, seed: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Let an estimator watch the logs, without driving.
 
     Returns:
@@ -93,7 +94,7 @@ def open_loop(estimator: Estimator, encounters: Encounters) -> tuple[FloatArray,
     log, n = encounters.log, len(encounters)
     assert log is not None
     estimator.start(n, Setting())
-    estimator.reset(np.arange(n), encounters.label)
+    estimator.reset(np.arange(n), encounters.label, stream_keys(encounters.case, seed))
     both = np.minimum(log.merging_station.lengths, log.host_station.lengths)
     parts = []
     for cycle in range(int(both.max()) - 1):

@@ -102,6 +102,7 @@ def simulate_batch(batch: Batch, plant: Plant, ramp: Ramp, traced: Sequence[int]
         batch.scenario.test,
         batch.setting(ramp),
         traced,
+        batch.seed,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.registry import Component, Registry
+from merge_cosim.streams import Keys
 from merge_cosim.units import BoolArray, FloatArray, IntArray
 
 
@@ -36,8 +37,14 @@ class Estimator(Component):
         """Make room for a batch of `count` encounters and forget everything before."""
         self.setting = setting
 
-    def reset(self, rows: IntArray, labels: IntArray) -> None:
-        """Forget the encounters at `rows` of the batch; new ones begin there (`labels` are for references only)."""
+    def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
+        """Forget the encounters at `rows` of the batch; new ones begin there.
+
+        Args:
+            rows: Where they begin, shape (m,).
+            labels: What the log or the script says they are (`Intention`); for references only. Shape (m,).
+            keys: Key of each one's random stream (`merge_cosim.streams`), shape (m,).
+        """
 
     @abstractmethod
     def update(self, seen: Observation) -> FloatArray:

@@ -13,7 +13,7 @@ from merge_cosim.encounter import Intention
 from merge_cosim.errors import UserError
 from merge_cosim.units import FloatArray, IntArray
 
-SCHEMA = 1
+SCHEMA = 2
 SPEED_BIN = 1.0
 """Width of a speed bin [m/s] (Dong, Dolan, Litkouhi 2017, Sec. IV-A)."""
 SPEED_BINS = 40
@@ -34,6 +34,7 @@ class IntentionModel:
         trained_on: Keys of the training merging cars, sorted; nobody may be tested on them.
         settings: How the pairs were chosen and split, for the reader.
         pairs: Number of pairs per intention, shape (2,).
+        merge_speed: Mean speed of the training merging cars at their lane change [m/s].
         transitions: Counts of speed-bin transitions by lag in cycles, each (2, SPEED_BINS,
             SPEED_BINS) as [I, from, to].
         arrivals: Share of each pair's frames by time to arrival, summed over pairs, (2, TIME_BINS, TIME_BINS) as
@@ -46,6 +47,7 @@ class IntentionModel:
     trained_on: tuple[str, ...]
     settings: dict[str, Any]
     pairs: IntArray
+    merge_speed: float
     transitions: dict[int, IntArray]
     arrivals: FloatArray
 
@@ -98,6 +100,7 @@ class IntentionModel:
             "source": self.source,
             "settings": self.settings,
             "pairs": {intention.name: int(self.pairs[intention]) for intention in _BOTH},
+            "merge_speed": self.merge_speed,
             "transitions": {
                 str(lag): {intention.name: _sparse(counts[intention]) for intention in _BOTH}
                 for lag, counts in self.transitions.items()
@@ -136,6 +139,7 @@ class IntentionModel:
                 trained_on=tuple(document["trained_on"]),
                 settings=document["settings"],
                 pairs=np.array([document["pairs"][intention.name] for intention in _BOTH]),
+                merge_speed=float(document["merge_speed"]),
                 transitions={
                     int(lag): np.stack([_dense(both[i.name], SPEED_BINS) for i in _BOTH]).astype(np.int64)
                     for lag, both in document["transitions"].items()

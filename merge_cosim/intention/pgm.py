@@ -11,6 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveInt
 from merge_cosim.intention.base import Estimator, estimators
 from merge_cosim.intention.model import IntentionModel, speed_bin, time_bin
 from merge_cosim.observation import Observation, Setting
+from merge_cosim.streams import Keys
 from merge_cosim.units import FloatArray, IntArray
 
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -61,7 +62,7 @@ class Pgm(Estimator):
         self._terms = np.zeros((count, max(self.nodes - 1, 1)))
         self._bins = np.zeros((count, self.transition_lag), dtype=np.int64)
 
-    def reset(self, rows: IntArray, labels: IntArray) -> None:
+    def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
         """Empty the rings at `rows`."""
         self._seen[rows] = 0
         self._sum[rows] = 0.0

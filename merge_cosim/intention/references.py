@@ -8,6 +8,7 @@ import numpy as np
 from merge_cosim.encounter import Intention
 from merge_cosim.intention.base import Estimator, certain, estimators
 from merge_cosim.observation import Observation, Setting
+from merge_cosim.streams import Keys
 from merge_cosim.units import FloatArray, IntArray
 
 
@@ -57,7 +58,7 @@ class OracleLabel(Estimator):
         super().start(count, setting)
         self._labels = np.full(count, int(Intention.YIELD))
 
-    def reset(self, rows: IntArray, labels: IntArray) -> None:
+    def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
         """Learn the labels of the new encounters."""
         self._labels[rows] = labels
 

@@ -33,12 +33,14 @@ def fit(encounters: Encounters, name: str, settings: Mapping[str, Any]) -> Inten
         raise UserError(f"model {name}: {pairs[0]} yielding and {pairs[1]} not yielding pairs; both are needed")
     transitions = {lag: np.zeros((2, SPEED_BINS, SPEED_BINS), dtype=np.int64) for lag in LAGS}
     arrivals = np.zeros((2, TIME_BINS, TIME_BINS))
+    merge_speeds = {}
     for row in range(len(encounters)):
         label = encounters.label[row]
         last = int(log.change_cycle[row])
         merging, host = log.merging_station[row], log.host_station[row][: last + 1]
         speed = _speeds(merging)[: last + 1]
         bins = speed_bin(speed)
+        merge_speeds[str(encounters.car[row])] = float(speed[-1])
         for lag, counts in transitions.items():
             np.add.at(counts[label], (bins[:-lag], bins[lag:]), 1)
         merging = merging[: len(host)]
@@ -54,6 +56,7 @@ def fit(encounters: Encounters, name: str, settings: Mapping[str, Any]) -> Inten
         trained_on=tuple(sorted({str(car) for car in encounters.car})),
         settings=dict(settings),
         pairs=pairs,
+        merge_speed=round(float(np.mean(list(merge_speeds.values()))), 6),
         transitions=transitions,
         arrivals=arrivals,
     )

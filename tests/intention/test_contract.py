@@ -7,6 +7,7 @@ from merge_cosim.control.base import controllers
 from merge_cosim.intention.base import estimators
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Observation, Setting
+from merge_cosim.streams import stream_keys
 
 CYCLES, COUNT = 70, 12
 
@@ -34,11 +35,12 @@ def make(name):
 
 def watch(estimator, rows, labels):
     estimator.start(len(rows), Setting())
-    estimator.reset(np.arange(len(rows)), labels[rows])
+    estimator.reset(np.arange(len(rows)), labels[rows], KEYS[rows])
     return np.array([estimator.update(pick(scene, rows)) for scene in scenes()])
 
 
 LABELS = np.arange(COUNT) % 2
+KEYS = stream_keys(LABELS.astype(str), 3) + np.arange(COUNT, dtype=np.uint64)
 
 
 @pytest.mark.parametrize("name", estimators.names())
@@ -55,7 +57,7 @@ def test_estimators_do_not_depend_on_their_batch(name):
 def test_estimators_forget_on_reset(name):
     estimator = make(name)
     first = watch(estimator, np.arange(COUNT), LABELS)
-    estimator.reset(np.arange(COUNT), LABELS)
+    estimator.reset(np.arange(COUNT), LABELS, KEYS)
     again = np.array([estimator.update(scene) for scene in scenes()])
     np.testing.assert_array_equal(first, again)
 

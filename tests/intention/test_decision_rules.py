@@ -11,7 +11,7 @@ from merge_cosim.observation import Observation, Setting
 
 def decide(estimator, host, merging, label=0, length=5.0):
     estimator.start(1, Setting())
-    estimator.reset(np.array([0]), np.array([label]))
+    estimator.reset(np.array([0]), np.array([label]), np.zeros(1, dtype=np.uint64))
     one = np.array
     log_odds = estimator.update(
         Observation(one([host[0]]), one([host[1]]), one([merging[0]]), one([merging[1]]), one([length]), one([length]))

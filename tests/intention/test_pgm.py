@@ -22,7 +22,17 @@ def small_model() -> IntentionModel:
     arrivals = np.zeros((2, TIME_BINS, TIME_BINS))
     arrivals[0, 10, 4] = 2.0
     arrivals[1, 4, 10] = 1.0
-    return IntentionModel("small", "us101", "ngsim", ("us101/a/1/1",), {}, np.array([2, 1]), {1: transitions}, arrivals)
+    return IntentionModel(
+        name="small",
+        site="us101",
+        source="ngsim",
+        trained_on=("us101/a/1/1",),
+        settings={},
+        pairs=np.array([2, 1]),
+        merge_speed=12.5,
+        transitions={1: transitions},
+        arrivals=arrivals,
+    )
 
 
 def seen(speed, merging=-50.0, host=-50.0, host_speed=10.0):
@@ -64,7 +74,7 @@ def test_one_node_is_time_and_prior():
     model, estimator = small_model(), PgmTime()
     estimator.use(model)
     estimator.start(1, Setting())
-    estimator.reset(np.array([0]), np.array([0]))
+    estimator.reset(np.array([0]), np.array([0]), np.zeros(1, dtype=np.uint64))
     now = seen(10.0)
     table = model.time_log_odds(0.05)
     expected = table[time_bin(now.merging_arrival), time_bin(now.host_arrival)] + model.prior_log_odds
@@ -83,7 +93,7 @@ def test_the_running_sum_is_the_direct_sum(speeds, nodes, lag):
     estimator = Pgm(nodes=nodes, transition_lag=lag, time_weight=0.0)
     estimator.use(model)
     estimator.start(1, Setting())
-    estimator.reset(np.array([0]), np.array([0]))
+    estimator.reset(np.array([0]), np.array([0]), np.zeros(1, dtype=np.uint64))
     table = model.speed_log_odds(lag, 0.05) / lag
     bins = speed_bin(np.array(speeds))
     for t, speed in enumerate(speeds):
