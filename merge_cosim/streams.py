@@ -38,7 +38,7 @@ def uniform(keys: Keys, first: IntArray, count: int) -> FloatArray:
         Shape (n, count).
     """
     place = first.astype(np.uint64)[:, None] + np.arange(1, count + 1, dtype=np.uint64)
-    mixed: Keys = keys[:, None] + place * _GOLDEN
+    mixed: Keys = np.add(keys[:, None], place * _GOLDEN, dtype=np.uint64)
     mixed = (mixed ^ (mixed >> _STEPS[0])) * _FIRST
     mixed = (mixed ^ (mixed >> _STEPS[1])) * _SECOND
     mixed ^= mixed >> _STEPS[2]
