@@ -1,9 +1,7 @@
-"""What all figures share: size, type, and the way into a page."""
+"""What all figures share: size and type."""
 
 from __future__ import annotations
 
-import base64
-import io
 from typing import Any
 
 import matplotlib as mpl
@@ -57,11 +55,3 @@ def grid_of(count: int, across: int, cell: tuple[float, float]) -> tuple[Figure,
     for above in axes[max(count - across, 0) : count]:
         above.tick_params(labelbottom=True)
     return figure, axes[:count]
-
-
-def data_uri(figure: Figure) -> str:
-    """The figure as SVG in a data URI, the same bytes for the same figure."""
-    buffer = io.BytesIO()
-    with style():
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import pandas as pd
-from matplotlib.figure import Figure
 
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.store import MANIFEST, SUMMARY_JSON, TRACES, ResultFolder
-from merge_cosim.report import canvas, case_figures, collisions, set_figures, tables
+from merge_cosim.report import case_figures, collisions, set_figures, tables
 from merge_cosim.report.columns import Table
 from merge_cosim.report.export import write_tables
+from merge_cosim.report.html import Picture, render
 from merge_cosim.report.methods import Look, in_order, looks
 from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER, PUBLISHED
 from merge_cosim.report.tables import ALL_SITES, Section
@@ -27,28 +26,6 @@ SOURCES = {
     "designed": "designed initial states, no data",
 }
 """What each source is called in headings."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure in the page.
-
-    Attributes:
-        uri: The picture itself.
-        width: Its natural width [CSS pixels].
-        caption: What it shows.
-        wide: It takes the whole width, and scrolls on a phone.
-    """
-
-    uri: str
-    width: int
-    caption: str
-    wide: bool = False
-
-    @classmethod
-    def of(cls, figure: Figure, caption: str, wide: bool = False) -> Picture:
-        """Embed a figure."""
-        return cls(canvas.data_uri(figure), round(96 * figure.get_figwidth()), caption, wide)
 
 
 @dataclass(frozen=True)
@@ -91,7 +68,8 @@ def write_report(folder: Path) -> Path:
     exported |= {f"vary-{key}": table for key, (table, _) in variations.items()}
     write_tables(folder, exported | {"collisions": contacts})
     file = folder / REPORT
-    page = _template().render(
+    page = render(
+        "report.html",
         head=_head(manifest, results),
         chapters=chapters,
         variations=variations.values(),
@@ -226,14 +204,3 @@ def _head(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, str]:
         f"{manifest['ratio_to_bare_sumo']} times the wall time of bare SUMO",
         "SUMO's stations": f"at most {manifest['worst_station_difference_m']:.1e} m from the closed form",
     }
-
-
-def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("merge_cosim.report"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    return environment.get_template("report.html")
