@@ -114,9 +114,10 @@ def load_plugin(file: Path) -> None:
     """Import a user's own file, whose classes register themselves."""
     if not file.is_file():
         raise UserError(f"{file}: no such plugin file")
-    module_name = f"merge_cosim_plugin_{file.stem}"
-    if module_name in sys.modules:
+    imported = (getattr(module, "__file__", None) for module in tuple(sys.modules.values()))
+    if any(name and Path(name).resolve() == file.resolve() for name in imported):
         return
+    module_name = f"merge_cosim_plugin_{file.stem}"
     spec = importlib.util.spec_from_file_location(module_name, file)
     if spec is None or spec.loader is None:
         raise UserError(f"{file}: not a Python file")
