@@ -40,7 +40,7 @@ class Effort:
         wall_s: Time in the loop [s].
         step_s: Of it, inside SUMO's steps [s].
         method_s: Of it, in estimating and controlling [s].
-        worst_difference_m: Largest difference between the plant's stations and the closed form at an encounter's end [m].
+        worst_difference_m: Largest difference of the plant's stations from the closed form, at an encounter's end [m].
     """
 
     vehicle_steps: int = 0
@@ -178,8 +178,8 @@ class _Loop:
         """The plant's state, rounded: the one place where this happens."""
         plant = self.plant
         state = (plant.host_station, plant.host_speed, plant.merging_station, plant.merging_speed)
-        rounded = np.concatenate(state).round(DECIMALS).reshape(4, plant.count)
-        return Observation(*rounded, self.host_length, self.merging_length)
+        host_station, host_speed, station, speed = np.concatenate(state).round(DECIMALS).reshape(4, plant.count)
+        return Observation(host_station, host_speed, station, speed, self.host_length, self.merging_length)
 
     def _refill(self, rows: IntArray) -> None:
         cases = np.arange(self.next_case, min(self.next_case + len(rows), len(self.encounters)))
