@@ -113,7 +113,7 @@ class Encounters:
     Attributes:
         case: Name of each encounter, unique within its source (str).
         site: Site of each encounter, such as `us101`; `designed` where there is none (str).
-        source: `ngsim`, `surrogate` or `designed` (str).
+        source: `ngsim`, `surrogate`, `designed` (a fixed grid, route files) or `random` (a sample) (str).
         car: Key of the merging car (`site/recording/vehicle/part`), by which data are split; empty if designed (str).
         host_station, host_speed, host_length: The host's initial state [m, m/s, m].
         merging_station, merging_speed, merging_length: The merging car's initial state.
@@ -147,6 +147,11 @@ class Encounters:
         """Return the chosen encounters, in that order."""
         arrays = {f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "log"}
         return replace(self, **arrays, log=None if self.log is None else self.log.take(rows))
+
+    def part(self, first: int, last: int) -> Encounters:
+        """Return the encounters `first` to `last - 1`, as views where that can be."""
+        arrays = {f.name: getattr(self, f.name)[first:last] for f in fields(self) if f.name != "log"}
+        return replace(self, **arrays, log=None if self.log is None else self.log.take(np.arange(first, last)))
 
     def digest(self) -> str:
         """A short hash of all that the encounters hold."""

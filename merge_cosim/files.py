@@ -1,6 +1,7 @@
 """Where shipped files and generated files lie."""
 
 import os
+import tempfile
 from pathlib import Path
 
 import platformdirs
@@ -20,3 +21,11 @@ def cache_folder(*parts: str) -> Path:
     folder = root.joinpath(*parts)
     folder.mkdir(parents=True, exist_ok=True)
     return folder
+
+
+def write_atomically(target: Path, content: bytes) -> None:
+    """Write a file so that another process sees it whole or not at all."""
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=target.name)
+    with os.fdopen(handle, "wb") as file:
+        file.write(content)
+    Path(name).replace(target)

@@ -28,6 +28,7 @@ SHOWN = (
 """Columns of the summary that fit a terminal."""
 
 Source = Literal["ngsim", "surrogate"]
+Start = Literal["spawn", "fork"]
 Data = Annotated[Path | None, typer.Option(help="Folder with NGSIM files (else $MERGE_COSIM_DATA, else ./data).")]
 Model = Annotated[str | None, typer.Option(help="Model file, or name of a model that comes with the project.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, such as acc.headway=1.2 or test.horizon=5.")]
@@ -51,6 +52,8 @@ def sweep(
     plugin: Plugins = None,
     out: Annotated[Path, typer.Option(help="Result folder.")] = Path("out"),
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
+    start: Annotated[Start, typer.Option(help="How processes are started.")] = "spawn",
+    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to run on, or 'local'.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Finish an interrupted sweep.")] = False,
     json: Json = False,
 ) -> None:
@@ -59,7 +62,7 @@ def sweep(
 
     from merge_cosim.cli.progress import sweep_progress
     from merge_cosim.experiments.methods import parse_setting, parse_variation
-    from merge_cosim.experiments.sweep import SweepRequest
+    from merge_cosim.experiments.plan import SweepRequest
     from merge_cosim.experiments.sweep import sweep as run_sweep
     from merge_cosim.ngsim.data import find_data
 
@@ -74,6 +77,8 @@ def sweep(
         seed=seed,
         plugins=plugin or (),
         jobs=jobs or os.cpu_count() or 1,
+        start=start,
+        dask=dask,
     )
     try:
         with sweep_progress() as progress:
@@ -109,8 +114,8 @@ def run(
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
     from merge_cosim.experiments.methods import parse_setting
+    from merge_cosim.experiments.plan import SweepRequest
     from merge_cosim.experiments.single import run_single
-    from merge_cosim.experiments.sweep import SweepRequest
     from merge_cosim.ngsim.data import find_data
 
     request = SweepRequest(
@@ -142,8 +147,8 @@ def export(
 ) -> None:
     """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us."""
     from merge_cosim.experiments.methods import parse_setting
+    from merge_cosim.experiments.plan import SweepRequest
     from merge_cosim.experiments.single import export_case
-    from merge_cosim.experiments.sweep import SweepRequest
     from merge_cosim.ngsim.data import find_data
 
     settings = dict(map(parse_setting, set_ or ()))

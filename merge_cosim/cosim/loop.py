@@ -39,9 +39,9 @@ class Effort:
         vehicle_steps: Vehicles times steps of running encounters.
         encounter_cycles: Cycles of running encounters.
         wall_s: Time in the loop [s].
-        step_s: Of it, in moving the cars [s].
+        step_s: Of it, inside SUMO's steps [s].
         method_s: Of it, in estimating and controlling [s].
-        worst_difference_m: Largest difference between the plant's stations and the closed form [m].
+        worst_difference_m: Largest difference of the plant's stations from the closed form, at an encounter's end [m].
     """
 
     vehicle_steps: int = 0
@@ -142,17 +142,19 @@ class _Loop:
         }
 
     def run(self) -> Run:
-        begin = perf_counter()
+        begin, stepped = perf_counter(), self.plant.step_s
         self._refill(np.arange(self.plant.count))
         now = self._observe()
         while (active := self.case >= 0).any():
             now = self._cycle(now, active)
         self.effort.wall_s = perf_counter() - begin
+        self.effort.step_s = self.plant.step_s - stepped
         return Run(self.columns, self.effort, {case: dict(trace) for case, trace in self.traces.items()})
 
     def _cycle(self, now: Observation, active: BoolArray) -> Observation:
         begin = perf_counter()
-        seen = replace(now, merging_speed=self.merging_car.observed_speed(self.age, now.merging_speed))
+        observed = self.merging_car.observed_speed(self.age, now.merging_speed)
+        seen = now if observed is now.merging_speed else replace(now, merging_speed=observed)
         log_odds = self.driver.estimator.update(seen)
         not_yield = log_odds >= 0.0
         target = np.where(now.merging_in_lane, now.merging_ahead, not_yield)
@@ -164,13 +166,11 @@ class _Loop:
         self.scorer.decided(now, not_yield)
         if self.traced:
             self._trace(now, log_odds, not_yield, host_speed)
-        moving = perf_counter()
         self.plant.advance(host_speed, merging_speed)
-        moved = perf_counter()
         self.shadow.advance(host_speed, merging_speed)
         self.age += 1
+        self.effort.method_s += decided - begin
         after = self._observe()
-        self._count(active, decided - begin, moved - moving)
         over = active & (self.scorer.moved(self.age, now, after, self.plant.colliding) | (self.age >= self.limit))
         if over.any():
             rows = np.flatnonzero(over)
@@ -182,14 +182,9 @@ class _Loop:
     def _observe(self) -> Observation:
         """The plant's state, rounded: the one place where this happens."""
         plant = self.plant
-        return Observation(
-            np.round(plant.host_station, DECIMALS),
-            np.round(plant.host_speed, DECIMALS),
-            np.round(plant.merging_station, DECIMALS),
-            np.round(plant.merging_speed, DECIMALS),
-            self.host_length,
-            self.merging_length,
-        )
+        state = (plant.host_station, plant.host_speed, plant.merging_station, plant.merging_speed)
+        host_station, host_speed, station, speed = np.concatenate(state).round(DECIMALS).reshape(4, plant.count)
+        return Observation(host_station, host_speed, station, speed, self.host_length, self.merging_length)
 
     def _refill(self, rows: IntArray) -> None:
         cases = np.arange(self.next_case, min(self.next_case + len(rows), len(self.encounters)))
@@ -211,25 +206,21 @@ class _Loop:
 
     def _finish(self, rows: IntArray, now: Observation) -> None:
         cases = self.case[rows]
+        cycles = int(self.age[rows].sum())
+        self.effort.encounter_cycles += cycles
+        self.effort.vehicle_steps += 2 * cycles
+        for ours, closed in (
+            (self.plant.host_station, self.shadow.host_station),
+            (self.plant.merging_station, self.shadow.merging_station),
+        ):  # a difference once made stays, so the end shows the largest
+            worst = float(np.abs(ours[rows] - closed[rows]).max())
+            self.effort.worst_difference_m = max(self.effort.worst_difference_m, worst)
         for name, column in self.scorer.columns.items():
             self.columns[name][cases] = column[rows]
         self.columns["end_cycle"][cases] = self.age[rows]
         self.columns["end_station"][cases] = now.host_station[rows]
         self.columns["end_speed"][cases] = now.host_speed[rows]
         self.columns["scored_to_end"][cases] = self.scorer.scored_to_end(self.age)[rows]
-
-    def _count(self, active: BoolArray, method_s: float, step_s: float) -> None:
-        running = int(np.count_nonzero(active))
-        self.effort.encounter_cycles += running
-        self.effort.vehicle_steps += 2 * running
-        self.effort.method_s += method_s
-        self.effort.step_s += step_s
-        differences = (
-            np.abs(self.plant.host_station - self.shadow.host_station),
-            np.abs(self.plant.merging_station - self.shadow.merging_station),
-        )
-        worst = float(np.max(np.where(active, np.maximum(*differences), 0.0)))
-        self.effort.worst_difference_m = max(self.effort.worst_difference_m, worst)
 
     def _trace(self, now: Observation, log_odds: FloatArray, not_yield: BoolArray, next_speed: FloatArray) -> None:
         for row in np.flatnonzero(np.isin(self.case, list(self.traced))).tolist():

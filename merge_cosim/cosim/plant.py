@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from time import perf_counter
 from typing import Protocol
 
 import numpy as np
@@ -24,9 +25,11 @@ class Plant(Protocol):
         count: Number of tiles.
         host_station, host_speed, merging_station, merging_speed: The state, shape (count,) each [m, m/s].
         colliding: Tiles in which SUMO reports a contact in the last step, shape (count,).
+        step_s: Time [s] spent inside SUMO's steps so far; commanding and reading the cars is not in it.
     """
 
     count: int
+    step_s: float
     host_station: FloatArray
     host_speed: FloatArray
     merging_station: FloatArray
@@ -45,6 +48,7 @@ class NumpyPlant:
 
     def __init__(self, count: int) -> None:
         self.count = count
+        self.step_s = 0.0
         self.host_station, self.host_speed = np.zeros(count), np.zeros(count)
         self.merging_station, self.merging_speed = np.zeros(count), np.zeros(count)
         self.colliding = np.zeros(count, dtype=bool)
@@ -80,6 +84,7 @@ class SumoPlant:
     ) -> None:
         self.ramp = ramp
         self.count = count
+        self.step_s = 0.0
         self.session = open_session(SumoOptions(tile_net(ramp, count), seed=seed, extra=extra))
         self._names = [tile_id(tile, car) for car in ("host", "merging") for tile in range(count)]
         self._row = {name: row for row, name in enumerate(self._names)}
@@ -108,26 +113,27 @@ class SumoPlant:
         self.merging_station[tiles] = encounters.merging_station[cases]
         self.merging_speed[tiles] = encounters.merging_speed[cases]
         self._in_host_lane[tiles] = not self.ramp.changes_lane
-        for tile, case in zip(tiles.tolist(), cases.tolist(), strict=True):
-            self._merge_position[[tile, tile + self.count]] = encounters.merge_position[case]
-            self._place(tile, "main", self.host_station[tile], self.host_speed[tile], encounters.host_length[case])
-            self._place(
-                tile + self.count,
-                "ramp",
-                self.merging_station[tile],
-                self.merging_speed[tile],
-                encounters.merging_length[case],
-            )
+        merge_position = encounters.merge_position[cases]
+        paths: tuple[tuple[Way, IntArray, FloatArray, FloatArray, FloatArray], ...] = (
+            ("main", tiles, self.host_station, self.host_speed, encounters.host_length),
+            ("ramp", tiles + self.count, self.merging_station, self.merging_speed, encounters.merging_length),
+        )
+        for path, rows, station, speed, length in paths:
+            self._place(path, rows, merge_position, station[tiles], speed[tiles], length[cases])
 
-    def _place(self, row: int, path: Way, station: float, speed: float, length: float) -> None:
-        name, tile = self._names[row], row % self.count
-        where = self.ramp.place(path, float(station), float(self._merge_position[row]))
-        self.session.place(name, tile_id(tile, f"{where.edge}_{where.lane}"), where.position, float(speed))
-        self._edge[row] = self._edge_number[path == "ramp"][where.edge]
-        self._position[row] = where.position
-        if self._length[row] != length:
-            self.session.set_length(name, float(length))
-            self._length[row] = length
+    def _place(self, path: Way, rows: IntArray, *columns: FloatArray) -> None:
+        """Put cars on a path; the columns are merging position, station, speed and length."""
+        self._merge_position[rows] = columns[0]
+        values = (column.tolist() for column in (rows, *columns))
+        for row, merge_position, station, speed, length in zip(*values, strict=True):
+            name = self._names[row]
+            where = self.ramp.place(path, station, merge_position)
+            self.session.place(name, tile_id(row % self.count, f"{where.edge}_{where.lane}"), where.position, speed)
+            self._edge[row] = self._edge_number[path == "ramp"][where.edge]
+            self._position[row] = where.position
+            if self._length[row] != length:
+                self.session.set_length(name, length)
+                self._length[row] = length
 
     def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
         """See `Plant`; a merging car whose front reaches the merging point in this cycle changes lane in it."""
@@ -138,7 +144,9 @@ class SumoPlant:
             self.session.change_lane(self._names[tile + self.count], self.ramp.host_lane_on(edge))
         self._in_host_lane |= arrives
         self.session.command(self._names, np.concatenate([host_speed, merging_speed]).tolist())
+        begin = perf_counter()
         self.session.step()
+        self.step_s += perf_counter() - begin
         self._read()
 
     def _read(self) -> None:

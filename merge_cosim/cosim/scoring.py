@@ -97,16 +97,17 @@ class Scorer:
             ("merging_reached_s", before.merging_station, now.merging_station, 0.0),
             ("goal_s", before.host_station, now.host_station, GOAL),
         ):
-            crosses = (old < line - TOLERANCE) & (new >= line - TOLERANCE)
-            if not crosses.any():
+            rows = np.flatnonzero((old < line - TOLERANCE) & (new >= line - TOLERANCE))
+            if not len(rows):
                 continue
-            part = np.clip(np.divide(line - old, new - old, out=np.ones_like(old), where=crosses), 0.0, 1.0)
-            c[name] = np.where(crosses, (age - 1 + part) * DT, c[name])
+            part = np.minimum(np.maximum((line - old[rows]) / (new[rows] - old[rows]), 0.0), 1.0)
+            c[name][rows] = (age[rows] - 1 + part) * DT
             if name == "host_reached_s":
-                other = before.merging_station + part * (now.merging_station - before.merging_station)
-                leader_length = np.where(other >= -TOLERANCE, now.merging_length, now.host_length)
-                c["distance_m"] = np.where(crosses, np.abs(other), c["distance_m"])
-                c["gap_m"] = np.where(crosses, np.abs(other) - leader_length, c["gap_m"])
+                start = before.merging_station[rows]
+                other = start + part * (now.merging_station[rows] - start)
+                leader_length = np.where(other >= -TOLERANCE, now.merging_length[rows], now.host_length[rows])
+                c["distance_m"][rows] = np.abs(other)
+                c["gap_m"][rows] = np.abs(other) - leader_length
 
     def _take_gaps(self, age: IntArray, now: Observation, scored: BoolArray) -> None:
         if not scored.any():

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from merge_cosim.errors import UserError
 from merge_cosim.units import DT
@@ -108,13 +108,20 @@ class Session(Protocol):
         """End the simulation."""
 
 
+class RawCalls(NamedTuple):
+    """The three calls that are made for every car in every step."""
+
+    set_speed: Callable[[str, float], None]
+    lane_position: Callable[[str], float]
+    speed: Callable[[str], float]
+
+
 class _ApiSession:
     """What libsumo and TraCI share: the same modules with the same functions."""
 
-    def __init__(self, api: Any, vehicle_set_speed: Callable[[str, float], None], errors: tuple[type[Exception], ...]):
+    def __init__(self, api: Any, raw: RawCalls) -> None:
         self._api = api
-        self._set_speed = vehicle_set_speed
-        self._errors = errors
+        self._raw = raw
         self.step: Callable[[], None] = api.simulationStep
 
     def add(self, cars: Iterable[Car]) -> None:
@@ -152,15 +159,15 @@ class _ApiSession:
 
     def command(self, cars: Sequence[str], speeds: Sequence[float]) -> None:
         """See `Session`."""
-        deque(map(self._set_speed, cars, speeds), maxlen=0)
+        deque(map(self._raw.set_speed, cars, speeds), maxlen=0)
 
     def positions(self, cars: Sequence[str]) -> Iterable[float]:
         """See `Session`."""
-        return map(self._api.vehicle.getLanePosition, cars)
+        return map(self._raw.lane_position, cars)
 
     def speeds(self, cars: Sequence[str]) -> Iterable[float]:
         """See `Session`."""
-        return map(self._api.vehicle.getSpeed, cars)
+        return map(self._raw.speed, cars)
 
     def colliding(self) -> Sequence[str]:
         """See `Session`."""
@@ -177,10 +184,11 @@ class LibsumoSession(_ApiSession):
 
     def __init__(self, options: SumoOptions) -> None:
         import libsumo
-        from libsumo import _libsumo  # the raw setter spares a Python frame per car and step
+        from libsumo import _libsumo as raw  # the raw calls spare a Python frame per car and step
 
         errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
-        super().__init__(libsumo, _libsumo.vehicle_setSpeed, errors)
+        calls = RawCalls(raw.vehicle_setSpeed, raw.vehicle_getLanePosition, raw.vehicle_getSpeed)
+        super().__init__(libsumo, calls)
         _open(lambda: libsumo.start(["sumo", *options.arguments()]), options, errors)
 
 
@@ -194,7 +202,7 @@ class TraciSession(_ApiSession):
         if "libsumo" in str(getattr(traci, "__file__", "")):
             raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
         errors = (traci.TraCIException, traci.FatalTraCIError)
-        super().__init__(traci, traci.vehicle.setSpeed, errors)
+        super().__init__(traci, RawCalls(traci.vehicle.setSpeed, traci.vehicle.getLanePosition, traci.vehicle.getSpeed))
         command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *options.arguments()]
         if gui:
             command += ["--start", "--quit-on-end", "--window-size", "1200,500"]

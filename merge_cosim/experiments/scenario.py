@@ -7,7 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+    model_validator,
+)
 
 from merge_cosim.cosim.scoring import Rules
 from merge_cosim.errors import UserError
@@ -50,6 +59,49 @@ class Grid(_Strict):
     host_offset: Span
     host_speed: Span
     merging_speed: Span
+    length: PositiveFloat = 5.0
+
+
+class Range(_Strict):
+    """An interval.
+
+    Attributes:
+        first: Its lower end.
+        last: Its upper end.
+    """
+
+    first: float = Field(alias="from")
+    last: float = Field(alias="to")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Range:
+        if self.last < self.first:
+            raise ValueError(f"'to' is below 'from' ({self.last:g} < {self.first:g})")
+        return self
+
+
+class Random(_Strict):
+    """Initial states drawn at random, each uniform in its range; as many as asked for.
+
+    The first cases of a larger count are the cases of a smaller one.
+
+    Attributes:
+        count: Number of cases.
+        seed: Seed of the draw.
+        merging_station: The merging car's initial station [m].
+        host_offset: The host's initial station minus the merging car's [m]; positive is ahead.
+        host_speed: The host's initial speed [m/s].
+        merging_speed: The merging car's initial speed [m/s].
+        length: Length of both cars [m].
+    """
+
+    kind: Literal["random"]
+    count: PositiveInt
+    seed: NonNegativeInt = 0
+    merging_station: Annotated[float, Field(lt=0)] = -90.0
+    host_offset: Range
+    host_speed: Range
+    merging_speed: Range
     length: PositiveFloat = 5.0
 
 
@@ -103,7 +155,7 @@ class Scenario(_Strict):
     title: str
     about: str = ""
     ramp: str
-    encounters: Annotated[Grid | Pairs | Routes, Field(discriminator="kind")]
+    encounters: Annotated[Grid | Random | Pairs | Routes, Field(discriminator="kind")]
     merging: dict[str, Any]
     test: Rules = Rules()
     speed_limit: PositiveFloat | None = None
@@ -186,6 +238,7 @@ def _set(document: dict[str, Any], name: str, value: Any) -> None:
 _KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules]] = {
     (): Scenario,
     ("encounters", "grid"): Grid,
+    ("encounters", "random"): Random,
     ("encounters", "pairs"): Pairs,
     ("encounters", "pairs", "rules"): PairRules,
     ("test",): Rules,
@@ -195,7 +248,7 @@ _KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules]] =
 def _first_problem(error: ValidationError) -> str:
     first = min(error.errors(), key=lambda one: one["type"] == "missing")  # a misspelt key is missing, too
     *place, key = first["loc"]
-    shown = ".".join(str(part) for part in first["loc"] if part not in ("grid", "pairs", "routes", "[key]"))
+    shown = ".".join(str(part) for part in first["loc"] if part not in ("grid", "random", "pairs", "routes", "[key]"))
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         section = _KNOWN.get(tuple(str(part) for part in place), Span)
         known = section.model_fields if issubclass(section, BaseModel) else parameters(section)

@@ -14,7 +14,7 @@ import pandas as pd
 from merge_cosim.cosim.plant import SumoPlant
 from merge_cosim.cosim.session import Session, SumoOptions, TraciSession
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.sweep import SweepRequest, plan
+from merge_cosim.experiments.plan import SweepRequest, plan
 from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.routes import write_encounter

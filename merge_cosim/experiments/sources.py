@@ -1,4 +1,4 @@
-"""From a scenario to its encounters: the grid, or pairs of the user's NGSIM files or of the surrogate."""
+"""From a scenario to its encounters: a grid, random states, or pairs of the user's NGSIM files or of the surrogate."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import numpy as np
 
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import Grid, Pairs, Routes, Scenario
+from merge_cosim.experiments.scenario import Grid, Pairs, Random, Routes, Scenario
 from merge_cosim.ngsim.encounters import at_site_point, site_encounters
 from merge_cosim.ngsim.sites import site
 from merge_cosim.ngsim.split import split_cars
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.route_reader import read_sumocfg
 from merge_cosim.traffic.surrogate import surrogate_folder
+from merge_cosim.units import FloatArray
 
 SourceChoice = Literal["ngsim", "surrogate"]
 
@@ -35,6 +36,8 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
     """
     if isinstance(scenario.encounters, Grid):
         return _grid(scenario.encounters)
+    if isinstance(scenario.encounters, Random):
+        return _random(scenario.encounters)
     if isinstance(scenario.encounters, Routes):
         return read_sumocfg(scenario.encounters.file)[1]
     parts = [
@@ -76,21 +79,42 @@ def pairs_of_site(name: str, pairs: Pairs, data: Path | None, source: SourceChoi
 def _grid(grid: Grid) -> Encounters:
     axes = (grid.host_offset.values(), grid.host_speed.values(), grid.merging_speed.values())
     offset, host_speed, merging_speed = (np.array(column) for column in zip(*product(*axes), strict=True))
-    n = len(offset)
     cases = [f"d{d:+g}_h{h:g}_m{m:g}" for d, h, m in zip(offset, host_speed, merging_speed, strict=True)]
+    return _designed(grid, "designed", cases, offset, host_speed, merging_speed)
+
+
+def _random(drawn: Random) -> Encounters:
+    spans = (drawn.host_offset, drawn.host_speed, drawn.merging_speed)
+    low, width = np.array([(span.first, span.last - span.first) for span in spans]).T
+    shares = np.random.default_rng(drawn.seed).random((drawn.count, 3))  # row by row, so that fewer are the first ones
+    offset, host_speed, merging_speed = (low + width * shares).T.copy()
+    cases = [f"r{number:07d}" for number in range(drawn.count)]
+    return _designed(drawn, "random", cases, offset, host_speed, merging_speed)
+
+
+def _designed(
+    states: Grid | Random,
+    source: str,
+    cases: list[str],
+    offset: FloatArray,
+    host_speed: FloatArray,
+    merging_speed: FloatArray,
+) -> Encounters:
+    """Encounters without a log; what is the same for all of them takes no room."""
+    n = len(cases)
     return Encounters(
         case=np.array(cases),
-        site=np.full(n, "designed"),
-        source=np.full(n, "designed"),
-        car=np.full(n, ""),
-        host_station=grid.merging_station + offset,
+        site=np.broadcast_to("designed", n),
+        source=np.broadcast_to(source, n),
+        car=np.broadcast_to("", n),
+        host_station=states.merging_station + offset,
         host_speed=host_speed,
-        host_length=np.full(n, grid.length),
-        merging_station=np.full(n, grid.merging_station),
+        host_length=np.broadcast_to(states.length, n),
+        merging_station=np.broadcast_to(states.merging_station, n),
         merging_speed=merging_speed,
-        merging_length=np.full(n, grid.length),
-        merge_position=np.zeros(n),
-        label=np.full(n, int(Intention.UNKNOWN)),
-        smoothed_source=np.zeros(n, dtype=bool),
-        length_missing=np.zeros(n, dtype=bool),
+        merging_length=np.broadcast_to(states.length, n),
+        merge_position=np.broadcast_to(0.0, n),
+        label=np.broadcast_to(int(Intention.UNKNOWN), n),
+        smoothed_source=np.broadcast_to(False, n),
+        length_missing=np.broadcast_to(False, n),
     )

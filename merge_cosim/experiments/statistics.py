@@ -56,7 +56,7 @@ def _summary(
     scored = group[~group["censored"]]
     failures, n = int(scored["failed"].sum()), len(scored)
     censored = len(group) - n
-    sample = key["source"] != "designed"
+    sample = key["source"] != "designed"  # a fixed grid is no sample
     low, high = _wilson(failures, n) if sample and n else (None, None)
     batch_us, single_us = cycle_us.get(key["method"], (None, None))
     own = scored[scored["failure_kind"] != "merging_into_host"]
@@ -96,12 +96,11 @@ def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
 
     Missing where always-go was not run.
     """
-    go = frame[frame["method"] == "always-go"].drop_duplicates(CASE).set_index(CASE)
+    go = frame[frame["method"] == "always-go"].drop_duplicates(CASE)
     possible = (go["host_first"] == True) & ~go["failed"] & (go["gap_m"].fillna(np.inf) >= D0)  # noqa: E712 - may be missing
-    go_first = pd.MultiIndex.from_frame(frame[CASE]).map(possible.to_dict())
-    passed_second = (frame["host_first"] == False).to_numpy()  # noqa: E712 - may be missing
-    known = pd.Series(go_first, index=frame.index, dtype="boolean")
-    return (known & pd.Series(passed_second, index=frame.index, dtype="boolean")).where(known.notna())
+    known = frame[CASE].merge(go[CASE].assign(possible=possible.astype("boolean")), how="left", on=CASE)["possible"]
+    passed_second = (frame["host_first"] == False).to_numpy(dtype=bool)  # noqa: E712 - may be missing
+    return known.set_axis(frame.index) & passed_second
 
 
 def _wilson(failures: int, n: int) -> tuple[float, float]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterator
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from merge_cosim.errors import UserError
@@ -21,6 +23,24 @@ RESULTS, SUMMARY_CSV, SUMMARY_JSON, MANIFEST, TRACES = (
     "manifest.json",
     "traces.parquet",
 )
+
+
+STRETCH_ROWS = 100_000
+"""Rows that are sorted and written at a time; more where more cases lie between each other."""
+
+
+class _Part(NamedTuple):
+    """A stored piece: its file, its scenario and variation, and the first of its cases by name."""
+
+    file: Path
+    group: tuple[str, str]
+    first: str
+
+    @classmethod
+    def of(cls, file: Path) -> _Part:
+        rows = pq.read_table(file, columns=["scenario", "variation", "case"])
+        least = {name: pc.min(rows[name]).as_py() for name in rows.column_names}
+        return cls(file, (least["scenario"], least["variation"]), least["case"])
 
 
 class ResultFolder:
@@ -62,18 +82,55 @@ class ResultFolder:
         """Store one batch's rows; after this they survive anything."""
         _write_table(self._parts / f"{name}.parquet", rows)
 
-    def merge(self, more: Iterable[pa.Table] = ()) -> pa.Table:
-        """Join all parts, and rows that the statistics made, into one sorted file; the parts go with `finish`."""
-        parts = [pq.read_table(file, schema=SCHEMA) for file in sorted(self._parts.glob("*.parquet"))]
-        rows = pa.concat_tables([*parts, *more]).sort_by(KEY)
-        rows = rows.replace_schema_metadata(SCHEMA.metadata)
-        _write_table(self.path / RESULTS, rows)
-        return rows
+    def merge(self, more: Callable[[pa.Table], pa.Table] | None = None) -> None:
+        """Join all parts into one file in the order of `KEY`, holding no more than some parts at a time.
 
-    def part_rows(self) -> pa.Table:
-        """All rows stored so far."""
-        parts = [pq.read_table(file, schema=SCHEMA) for file in sorted(self._parts.glob("*.parquet"))]
-        return pa.concat_tables(parts)
+        The parts stay until `finish`.
+
+        Args:
+            more: Makes further rows from the rows of a stretch of cases, of which it gets all methods.
+        """
+        unfinished = (self.path / RESULTS).with_suffix(".tmp")
+        with pq.ParquetWriter(unfinished, SCHEMA, compression="zstd") as writer:
+            for rows in self._stretches():
+                if more is not None:
+                    rows = pa.concat_tables([rows, more(rows)])
+                rows = rows.sort_by(KEY).replace_schema_metadata(SCHEMA.metadata)
+                writer.write_table(rows, row_group_size=len(rows))
+        os.replace(unfinished, self.path / RESULTS)
+
+    def _stretches(self) -> Iterator[pa.Table]:
+        """All stored rows, scenario by scenario, in stretches of whole cases that follow each other by name."""
+        files = self._parts.glob("*.parquet")
+        parts = sorted((_Part.of(file) for file in files), key=lambda part: (part.group, part.first, part.file.name))
+        for _, group in groupby(parts, key=lambda part: part.group):
+            held: list[pa.Table] = []
+            members = list(group)
+            for part, after in zip(members, [*members[1:], None], strict=True):
+                held.append(pq.read_table(part.file, schema=SCHEMA))
+                if after is None:
+                    yield pa.concat_tables(held)
+                elif sum(map(len, held)) >= STRETCH_ROWS:
+                    rows = pa.concat_tables(held)
+                    whole = pc.less(rows["case"], after.first)  # no later part has a row of these cases
+                    if pc.any(whole).as_py():
+                        yield rows.filter(whole)
+                        held = [rows.filter(pc.invert(whole))]
+
+    def groups(self) -> list[tuple[str, str]]:
+        """The scenarios and variations of the merged file, in its order."""
+        seen: dict[tuple[str, str], None] = {}
+        with pq.ParquetFile(self.path / RESULTS) as file:
+            for number in range(file.num_row_groups):
+                names = file.read_row_group(number, columns=["scenario", "variation"])
+                pairs = names.group_by(["scenario", "variation"]).aggregate([]).to_pylist()
+                seen |= dict.fromkeys((pair["scenario"], pair["variation"]) for pair in pairs)
+        return sorted(seen)
+
+    def rows_of(self, scenario: str, variation: str, columns: list[str] | None = None) -> pa.Table:
+        """The merged file's rows of one scenario and variation."""
+        which = [("scenario", "=", scenario), ("variation", "=", variation)]
+        return pq.read_table(self.path / RESULTS, columns=columns, filters=which)
 
     def write_traces(self, records: pa.Table) -> None:
         """Write the cycle-by-cycle records of the telling cases."""

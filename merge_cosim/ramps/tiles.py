@@ -1,14 +1,12 @@
 """Many copies of a ramp side by side in one net, so that one SUMO steps a batch of encounters."""
 
 import hashlib
-import os
-import tempfile
 from copy import deepcopy
 from pathlib import Path
 
 from lxml import etree
 
-from merge_cosim.files import cache_folder
+from merge_cosim.files import cache_folder, write_atomically
 from merge_cosim.ramps.ramp import Ramp
 
 SPACING = 30.0
@@ -43,7 +41,7 @@ def tile_net(ramp: Ramp, count: int) -> Path:
         net = etree.fromstring(source, etree.XMLParser(remove_blank_text=True, remove_comments=True))
         _reduce(net, ramp)
         _multiply(net, count)
-        _write_atomically(target, etree.tostring(net, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+        write_atomically(target, etree.tostring(net, xml_declaration=True, encoding="UTF-8", pretty_print=True))
     return target
 
 
@@ -109,11 +107,3 @@ def _shifted(element: etree._Element, tile: int, offset: float) -> etree._Elemen
         if y := part.get("y"):
             part.set("y", f"{float(y) + offset:.2f}")
     return element
-
-
-def _write_atomically(target: Path, content: bytes) -> None:
-    """Write a file so that another process sees it whole or not at all."""
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=target.name)
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-    Path(name).replace(target)

@@ -24,6 +24,7 @@ SOURCES = {
     "ngsim": "real NGSIM data",
     "surrogate": "SYNTHETIC surrogate data, made by SUMO, not real",
     "designed": "designed initial states, no data",
+    "random": "random initial states, no data",
 }
 """What each source is called in headings."""
 
@@ -109,7 +110,7 @@ def _chapter(
     site = "all sites" if section.site == ALL_SITES else section.site
     return Chapter(
         section=section,
-        title=scenario["title"] if section.source == "designed" else f"{scenario['title']}, {site}",
+        title=scenario["title"] if section.source in ("designed", "random") else f"{scenario['title']}, {site}",
         source=SOURCES.get(section.source, section.source),
         about=f"Scenario {section.scenario}. {' '.join(scenario['about'].split())}",
         notes=_notes(section, rows, scenario, manifest),
@@ -124,7 +125,7 @@ def _notes(section: Section, rows: pd.DataFrame, scenario: dict[str, Any], manif
     notes += [f"Model {model}: {', '.join(in_order(methods))}." for model, methods in models.items()]
     if section.source == "surrogate":
         notes.append("Every pair is made by SUMO, also where the text above speaks of a log: no real car is in it.")
-    if section.source != "designed" and scenario["merging"]["model"] != "replay":
+    if section.source not in ("designed", "random") and scenario["merging"]["model"] != "replay":
         notes.append(
             f"Only the initial states come from {SOURCES.get(section.source, section.source)}; the merging car drives "
             f"by the model '{scenario['merging']['model']}'."

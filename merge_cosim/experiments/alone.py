@@ -1,0 +1,57 @@
+"""A few cases of a sweep one at a time: to time a method in a batch of one, and to record the most telling case."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from merge_cosim.cosim.loop import Effort
+from merge_cosim.experiments.store import ResultFolder
+from merge_cosim.experiments.work import Batch, Workplace, simulate_batch
+from merge_cosim.ramps.ramp import Ramp
+
+SINGLE_CASES = 5
+"""Cases run one at a time to time a method's update in a batch of one."""
+
+
+def run_alone(batches: Sequence[Batch], results: ResultFolder) -> tuple[dict[str, float], pa.Table]:
+    """Run a few cases of each scenario and method one at a time, the most telling one first and recorded.
+
+    Returns:
+        Time of one update in a batch of one [us] by method, and the records of the telling cases.
+    """
+    telling: dict[str, str] = {}
+    efforts: dict[str, Effort] = {}
+    records = []
+    workplace = Workplace(tiles=1)
+    for batch in batches:
+        if batch.variation:
+            continue
+        scenario = batch.scenario.name
+        if scenario not in telling:
+            telling[scenario] = _telling_case(
+                results.rows_of(scenario, "", ["case", "failed", "distance_m"]).to_pandas()
+            )
+        order = np.argsort(batch.encounters.case != telling[scenario], kind="stable")[:SINGLE_CASES]
+        few = replace(batch, encounters=batch.encounters.take(order))
+        ramp = Ramp.load(batch.scenario.ramp)
+        run = simulate_batch(few, workplace.plant(ramp, 1, batch.seed), ramp, traced=(0,))
+        efforts.setdefault(batch.method.name, Effort()).add(run.effort)
+        names = {"scenario": scenario, "case": str(few.encounters.case[0]), "method": batch.method.name}
+        records.append(pd.DataFrame(run.traces[0]).assign(**names))
+    workplace.close()
+    times = {name: 1e6 * effort.method_s / effort.encounter_cycles for name, effort in efforts.items()}
+    return times, pa.Table.from_pandas(pd.concat(records), preserve_index=False)
+
+
+def _telling_case(rows: pd.DataFrame) -> str:
+    """The case on which the methods differ most: in failing, then in where they are when the host arrives."""
+    by_case = rows.groupby("case")
+    failing = by_case["failed"].mean()
+    spread = by_case["distance_m"].max() - by_case["distance_m"].min()
+    order = pd.DataFrame({"split": failing * (1 - failing), "spread": spread.fillna(0.0)})
+    return str(order.sort_values(["split", "spread"], ascending=False, kind="stable").index[0])

@@ -1,0 +1,186 @@
+"""The executor for a Dask cluster: the same pieces on workers of other machines."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import pyarrow as pa
+
+from merge_cosim.cosim.loop import Effort
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.executors import Finished
+from merge_cosim.experiments.pieces import Handout, Piece
+from merge_cosim.experiments.plan import versions
+from merge_cosim.experiments.work import Batch, Workplace, run_batch
+from merge_cosim.files import cache_folder, write_atomically
+from merge_cosim.ramps.definition import FILE_NAME
+from merge_cosim.ramps.ramp import Ramp, find_ramp
+from merge_cosim.registry import load_plugin
+
+LOCAL = "local"
+"""Address that stands for a cluster of this machine's processes, made for the sweep."""
+CONNECT_S = 10.0
+"""Time [s] in which a scheduler must answer."""
+WORKERS_S = 60.0
+"""Time [s] in which its first worker must be there."""
+ONE_THREAD = "libsumo holds one simulation per process; start the workers with: dask worker ADDRESS --nthreads 1"
+
+
+@dataclass(frozen=True)
+class Kit:
+    """What a worker elsewhere needs beside the batch, which carries cases, scenario, method and model.
+
+    Attributes:
+        versions: What this process runs; a worker that runs anything else is refused.
+        ramp: Files of the ramp by name.
+        ramp_name: Its name.
+        plugins: Files with the user's own components by name.
+    """
+
+    versions: Mapping[str, str]
+    ramp: Mapping[str, bytes]
+    ramp_name: str
+    plugins: Mapping[str, bytes]
+
+
+class Cluster:
+    """Runs the pieces on the workers of a Dask scheduler.
+
+    A worker that is lost costs the pieces it held, which the scheduler gives to others; workers may come and go.
+    """
+
+    def __init__(self, address: str, jobs: int = 1, plugins: Sequence[Path] = ()) -> None:
+        self._address = address
+        self._jobs = jobs
+        self._plugins = {plugin.name: plugin.read_bytes() for plugin in plugins}
+        try:
+            import distributed
+        except ImportError:
+            raise UserError("--dask: dask.distributed is not installed; pip install 'merge-cosim[dask]'") from None
+        self._distributed: Any = distributed
+
+    def run(self, handout: Handout) -> Iterator[Finished]:
+        """See `Executor`."""
+        kits: dict[str, Kit] = {}
+        session = uuid4().hex[:8]
+        with self._client() as client:
+            self._check(client)
+            running: dict[Any, Piece] = {}
+            done = self._distributed.as_completed()
+
+            def fill() -> None:
+                """Keep a piece ahead of every worker, no more, so that the longest still go first."""
+                while len(running) < 2 * max(1, len(client.nthreads())) and (piece := handout.take()):
+                    ramp = piece.whole.scenario.ramp
+                    if ramp not in kits:
+                        kits[ramp] = self._kit(ramp)
+                    key = f"merge-cosim-{session}-{piece.name}"
+                    future = client.submit(run_shipped, piece.batch(), kits[ramp], key=key, pure=False)
+                    running[future] = piece
+                    done.add(future)
+
+            fill()
+            for future in done:
+                piece = running.pop(future)
+                rows, effort = self._result(future, piece)
+                fill()
+                yield Finished(piece, rows, effort)
+
+    @contextmanager
+    def _client(self) -> Iterator[Any]:
+        if self._address == LOCAL:
+            cluster = self._distributed.LocalCluster(
+                n_workers=self._jobs, threads_per_worker=1, processes=True, dashboard_address=None
+            )
+            with cluster, self._distributed.Client(cluster) as client:
+                yield client
+            return
+        try:
+            client = self._distributed.Client(self._address, timeout=CONNECT_S)
+        except (OSError, TimeoutError, ValueError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise UserError(f"--dask {self._address}: no scheduler answers there ({reason})") from None
+        with client:
+            yield client
+
+    def _check(self, client: Any) -> None:
+        """Refuse workers that cannot give the same rows."""
+        try:
+            client.wait_for_workers(1, timeout=WORKERS_S)
+        except TimeoutError:
+            raise UserError(f"--dask {self._address}: no worker within {WORKERS_S:g} s; start some") from None
+        for worker, threads in client.nthreads().items():
+            if threads != 1:
+                raise UserError(f"--dask {self._address}: worker {worker} has {threads} threads; {ONE_THREAD}")
+        for worker, theirs in client.run(versions, on_error="return").items():
+            if isinstance(theirs, BaseException):
+                raise UserError(f"--dask {self._address}: worker {worker} cannot run merge-cosim: {theirs!r}")
+            _compare(theirs, versions(), f"worker {worker}")
+
+    def _kit(self, ramp: str) -> Kit:
+        folder = find_ramp(ramp)
+        files = (folder / FILE_NAME, Ramp.load(ramp).net)
+        return Kit(versions(), {file.name: file.read_bytes() for file in files}, folder.resolve().name, self._plugins)
+
+    def _result(self, future: Any, piece: Piece) -> tuple[pa.Table, Effort]:
+        try:
+            rows, effort = future.result()
+        except self._distributed.scheduler.KilledWorker as error:
+            raise UserError(f"{piece}: several workers died while running these cases ({error})") from None
+        return rows, effort
+
+
+def _compare(theirs: Mapping[str, str], ours: Mapping[str, str], who: str) -> None:
+    wrong = [f"{name} {theirs.get(name)} instead of {ours[name]}" for name in ours if theirs.get(name) != ours[name]]
+    if wrong:
+        raise UserError(f"--dask: {who} has {', '.join(wrong)}; rows would not be the same, install the same versions")
+
+
+_at_work = threading.Lock()
+_workplace: Workplace | None = None
+_plugins_here: dict[str, str] = {}
+
+
+def run_shipped(batch: Batch, kit: Kit) -> tuple[pa.Table, Effort]:
+    """What a Dask worker does with a piece: check, unpack, run; its SUMO stays open for the next one.
+
+    Raises:
+        UserError: The worker runs several tasks at a time, or other versions.
+    """
+    global _workplace
+    if not _at_work.acquire(blocking=False):
+        raise UserError(f"--dask: a worker runs several tasks at a time; {ONE_THREAD}")
+    try:
+        _compare(versions(), kit.versions, "a worker")
+        for name, content in kit.plugins.items():
+            _load_shipped(name, content)
+        ramp = _unpack("ramps", kit.ramp, kit.ramp_name)
+        if _workplace is None:
+            _workplace = Workplace()
+        return run_batch(replace(batch, scenario=batch.scenario.model_copy(update={"ramp": str(ramp)})), _workplace)
+    finally:
+        _at_work.release()
+
+
+def _load_shipped(name: str, content: bytes) -> None:
+    digest = hashlib.sha256(content).hexdigest()
+    if _plugins_here.setdefault(name, digest) != digest:
+        raise UserError(f"--dask: the workers have loaded another {name} before; restart them")
+    load_plugin(_unpack("plugins", {name: content}, "") / name)
+
+
+def _unpack(kind: str, files: Mapping[str, bytes], name: str) -> Path:
+    """Write files that came along into a folder of the cache that is named by their content."""
+    digest = hashlib.sha256(b"".join(key.encode() + content for key, content in sorted(files.items()))).hexdigest()[:16]
+    folder = cache_folder("shipped", kind, digest, name)
+    for key, content in files.items():
+        if not (folder / key).is_file():
+            write_atomically(folder / key, content)
+    return folder

@@ -1,0 +1,187 @@
+"""Executors: where the pieces of a sweep are run. All of them give the same rows."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import threading
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import BaseContext
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import pyarrow as pa
+
+from merge_cosim.cosim.loop import Effort
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.pieces import Handout, Piece
+from merge_cosim.experiments.plan import StartMethod, SweepRequest
+from merge_cosim.experiments.work import Workplace, run_batch
+from merge_cosim.registry import load_plugin
+
+MOST_LOSSES = 3
+"""Workers that one piece may lose before the sweep gives up on it."""
+
+
+class Finished(NamedTuple):
+    """A piece that has been run."""
+
+    piece: Piece
+    rows: pa.Table
+    effort: Effort
+
+
+class Executor(Protocol):
+    """Runs pieces somewhere."""
+
+    def run(self, handout: Handout) -> Iterator[Finished]:
+        """Run all pieces of `handout` and yield each as soon as it is done, in any order.
+
+        Raises:
+            UserError: There is no place to run them, or a piece cannot be run.
+        """
+
+
+def executor_for(request: SweepRequest, pieces: int) -> Executor:
+    """The executor that a request asks for; a single process needs no other."""
+    if request.dask is not None:
+        from merge_cosim.experiments.cluster import Cluster
+
+        return Cluster(request.dask, request.jobs, request.plugins)
+    jobs = min(request.jobs, pieces)
+    return Processes(jobs, request.plugins, request.start) if jobs > 1 else InProcess()
+
+
+class InProcess:
+    """Runs the pieces in this process, one after the other."""
+
+    def run(self, handout: Handout) -> Iterator[Finished]:
+        """See `Executor`."""
+        workplace = Workplace()
+        try:
+            while piece := handout.take():
+                yield Finished(piece, *run_batch(piece.batch(), workplace))
+        finally:
+            workplace.close()
+
+
+class Processes:
+    """Runs the pieces in processes of this machine, each with a SUMO of its own.
+
+    Every worker holds one piece at a time and has its own pipe, so one that is killed takes no other with it: its piece
+    goes to a new worker. (The pool of the standard library breaks as a whole.)
+
+    `spawn` starts every worker as a fresh interpreter, which is safe everywhere. `fork` copies this process, which
+    spares a worker its imports; it is refused where threads run, which a copy would not have.
+    """
+
+    def __init__(self, jobs: int, plugins: Sequence[Path] = (), start: StartMethod = "spawn") -> None:
+        if start not in multiprocessing.get_all_start_methods():
+            raise UserError(f"--start {start}: this system cannot; use --start spawn")
+        if start == "fork" and threading.active_count() > 1:
+            raise UserError("--start fork: this process runs threads, which a fork would break; use --start spawn")
+        self._jobs = jobs
+        self._plugins = tuple(plugins)
+        self._context = multiprocessing.get_context(start)
+
+    def run(self, handout: Handout) -> Iterator[Finished]:
+        """See `Executor`."""
+        losses: Counter[str] = Counter()
+        workers: dict[Connection, _Worker] = {}
+        try:
+            for _ in range(min(self._jobs, len(handout))):
+                self._employ(handout.take(), workers)
+            while busy := [connection for connection, worker in workers.items() if worker.piece]:
+                for connection in wait(busy):
+                    assert isinstance(connection, Connection)
+                    worker = workers[connection]
+                    piece = worker.piece
+                    assert piece is not None
+                    try:
+                        outcome = connection.recv()
+                    except (EOFError, OSError):
+                        del workers[connection]
+                        losses[piece.name] += 1
+                        if losses[piece.name] == MOST_LOSSES:
+                            raise UserError(_lost(piece, worker)) from None
+                        worker.stop()
+                        self._employ(piece, workers)
+                        continue
+                    if isinstance(outcome, BaseException):
+                        raise outcome
+                    worker.begin(handout.take())  # before its rows are stored, so that it need not wait for that
+                    yield Finished(piece, *outcome)
+        finally:
+            for worker in workers.values():
+                worker.stop()
+
+    def _employ(self, piece: Piece | None, workers: dict[Connection, _Worker]) -> None:
+        worker = _Worker(self._context, self._plugins)
+        workers[worker.connection] = worker
+        worker.begin(piece)
+
+
+class _Worker:
+    """A worker process, as its employer sees it."""
+
+    def __init__(self, context: BaseContext, plugins: tuple[Path, ...]) -> None:
+        self.connection, there = context.Pipe()
+        self.piece: Piece | None = None
+        forked = context.get_start_method() == "fork"
+        inherited = self.connection if forked else None
+        self.process: Any = context.Process(  # type: ignore[attr-defined]
+            target=_serve, args=(there, inherited, plugins), name="merge-cosim worker", daemon=True
+        )
+        self.process.start()
+        there.close()
+
+    def begin(self, piece: Piece | None) -> None:
+        self.piece = piece
+        if piece is not None:
+            with suppress(OSError):  # it is dead; reading from it will say so
+                self.connection.send(piece.batch())
+
+    def stop(self) -> None:
+        """End the process: at once if it is at work, else by its own will."""
+        if self.piece is not None:
+            self.process.terminate()
+        else:
+            with suppress(OSError):
+                self.connection.send(None)
+        self.connection.close()
+        self.process.join()
+
+
+def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
+    """What a worker process does: run what comes through the pipe, until that is None or nobody is there any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the employer decides what an interrupt means
+    if inherited is not None:
+        inherited.close()  # else the worker would never see that the employer has gone
+    workplace = Workplace()
+    try:
+        for plugin in plugins:
+            load_plugin(plugin)
+        while (batch := employer.recv()) is not None:
+            outcome: object
+            try:
+                outcome = run_batch(batch, workplace)
+            except Exception as error:
+                outcome = error
+            employer.send(outcome)
+    except (EOFError, OSError):  # the employer was killed
+        pass
+    finally:
+        workplace.close()
+
+
+def _lost(piece: Piece, worker: _Worker) -> str:
+    worker.process.join()
+    code = worker.process.exitcode
+    end = f"by signal {-code}" if code < 0 else f"with status {code}"
+    return (
+        f"{piece}: {MOST_LOSSES} worker processes in a row died while running these cases, the last one {end} "
+        f"(9: killed, as for want of memory); what was finished is kept, go on with --resume, perhaps with fewer --jobs"
+    )

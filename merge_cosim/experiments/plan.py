@@ -1,0 +1,206 @@
+"""From what the user asked for to what there is to run: one batch per (scenario, variation, method)."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+import merge_cosim
+from merge_cosim.encounter import Encounters
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.methods import (
+    CONSTANT,
+    ORACLE_BEST,
+    Method,
+    default_methods,
+    methods_for,
+    split_settings,
+)
+from merge_cosim.experiments.scenario import Scenario, load_scenario
+from merge_cosim.experiments.sources import SourceChoice, load_encounters
+from merge_cosim.experiments.work import Batch
+from merge_cosim.intention.model import IntentionModel
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.registry import load_plugin
+from merge_cosim.units import IntArray
+
+StartMethod = Literal["spawn", "fork"]
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """What the user asked for.
+
+    Attributes:
+        scenarios: Names or files.
+        methods: Names; empty for all that there are.
+        model: Model file or name; None for the one that goes with each scenario's source.
+        settings: Values of scenario keys and of component parameters.
+        variations: One name and its values each, varied one at a time.
+        data: Folder with NGSIM files.
+        source: Force real data or the surrogate.
+        seed: SUMO's seed.
+        plugins: Files with the user's own components.
+        jobs: Processes.
+        start: How processes come to be, see `executors.Processes`.
+        dask: Address of a Dask scheduler, or `local`; None for processes of this machine.
+    """
+
+    scenarios: Sequence[str]
+    methods: Sequence[str] = ()
+    model: str | None = None
+    settings: dict[str, Any] = field(default_factory=dict)
+    variations: Sequence[tuple[str, Sequence[Any]]] = ()
+    data: Path | None = None
+    source: SourceChoice | None = None
+    seed: int = 0
+    plugins: Sequence[Path] = ()
+    jobs: int = 1
+    start: StartMethod = "spawn"
+    dask: str | None = None
+
+
+def plan(request: SweepRequest) -> list[Batch]:
+    """Work out what to run, one batch per (scenario, variation, method); all mistakes of the user show here.
+
+    Raises:
+        UserError: Something asked for does not exist or does not fit.
+    """
+    for plugin in request.plugins:
+        load_plugin(plugin)
+    loaded: dict[str, Encounters] = {}
+    batches: list[Batch] = []
+    for varied, values in [("", [None]), *request.variations]:
+        for value in values:
+            settings = request.settings | ({varied: value} if varied else {})
+            of_scenario, of_components = split_settings(settings)
+            methods = _methods(request.methods, of_components)
+            if varied in of_components:
+                methods = [one for one in methods if varied.partition(".")[0] in (one.estimator, one.controller)]
+            for scenario in _scenarios(request.scenarios, of_scenario, varied):
+                key = repr((scenario.encounters, scenario.is_replay, scenario.ramp))
+                if key not in loaded:
+                    loaded[key] = _by_name(load_encounters(scenario, request.data, request.source))
+                label = f"{varied}={value}" if varied else ""
+                batches += _scenario_batches(scenario, label, methods, loaded[key], request)
+    if not batches:
+        raise UserError("nothing to run: no method fits the scenarios")
+    return batches
+
+
+def _scenarios(names: Sequence[str], settings: dict[str, Any], varied: str) -> list[Scenario]:
+    """Load the scenarios; one that does not know what is varied is left as it is, if another does."""
+    loaded, refused = [], []
+    for name in dict.fromkeys(names):
+        try:
+            loaded.append(load_scenario(name, settings))
+        except UserError as error:
+            if varied not in settings:
+                raise
+            refused.append(error)
+    if not loaded:
+        raise refused[0]
+    return loaded
+
+
+def _methods(names: Sequence[str], settings: dict[str, Any]) -> list[Method]:
+    wanted = list(dict.fromkeys(names or default_methods()))
+    if ORACLE_BEST in wanted:
+        wanted = list(dict.fromkeys([*(name for name in wanted if name != ORACLE_BEST), *CONSTANT]))
+    return [Method.parse(name, settings) for name in wanted]
+
+
+def _scenario_batches(
+    scenario: Scenario, variation: str, methods: list[Method], encounters: Encounters, request: SweepRequest
+) -> Iterator[Batch]:
+    encounters, left_out = _on_the_ramp(scenario, encounters)
+    for source in dict.fromkeys(encounters.source.tolist()):
+        chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
+        for method in methods_for(chosen, methods):
+            model = IntentionModel.load(request.model or default_model(source)) if method.needs_model else None
+            if model is not None:
+                _refuse_trained(scenario, chosen, model)
+                method.driver(model)
+            yield Batch(scenario, variation, method, model, chosen, request.seed, left_out)
+
+
+def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:
+    """The encounters that the ramp has room for, and the names of the others."""
+    ramp = Ramp.load(scenario.ramp)
+    fits = ramp.holds(encounters.merge_position, encounters.host_station, encounters.merging_station)
+    if not fits.any():
+        merge_position = float(encounters.merge_position[0])
+        ramp.place("main", float(encounters.host_station[0]), merge_position)
+        ramp.place("ramp", float(encounters.merging_station[0]), merge_position)
+    return _taken(encounters, np.flatnonzero(fits)), tuple(encounters.case[~fits].tolist())
+
+
+def _by_name(encounters: Encounters) -> Encounters:
+    """Sorted as results are stored, so that a part of a sweep holds a stretch of the stored rows."""
+    if (encounters.case[:-1] <= encounters.case[1:]).all():
+        return encounters
+    return encounters.take(np.argsort(encounters.case, kind="stable"))
+
+
+def _taken(encounters: Encounters, rows: IntArray) -> Encounters:
+    """The chosen encounters; no copy where that is all of them."""
+    return encounters if len(rows) == len(encounters) else encounters.take(rows)
+
+
+def default_model(source: str) -> str:
+    """Name of the project's own model for encounters of a source."""
+    return "us101-surrogate" if source == "surrogate" else "us101-ngsim"
+
+
+def _refuse_trained(scenario: Scenario, encounters: Encounters, model: IntentionModel) -> None:
+    if not scenario.is_replay or model.source != str(encounters.source[0]):
+        return
+    known = sorted(set(encounters.car.tolist()) & set(model.trained_on))
+    if known:
+        raise UserError(
+            f"scenario {scenario.name}: model {model.name} was trained on {len(known)} of its merging cars "
+            f"(such as {known[0]}); choose another --model or split"
+        )
+
+
+def versions() -> dict[str, str]:
+    """Versions of what results depend on."""
+    return {
+        "merge-cosim": merge_cosim.__version__,
+        "libsumo": version("libsumo"),
+        "numpy": version("numpy"),
+        "python": platform.python_version(),
+    }
+
+
+def identity(request: SweepRequest, batches: list[Batch]) -> dict[str, Any]:
+    """What makes two sweeps the same: the same rows come out of the same identity."""
+    models = {batch.model.name: batch.model for batch in batches if batch.model}
+    digests = {
+        id(held): held.digest() for held in {id(batch.encounters): batch.encounters for batch in batches}.values()
+    }
+    return {
+        "versions": versions(),
+        "seed": request.seed,
+        "methods": sorted({batch.method.name for batch in batches}),
+        "settings": {key: str(value) for key, value in request.settings.items()},
+        "variations": [[name, [str(value) for value in values]] for name, values in request.variations],
+        "models": {name: _digest(model.to_json()) for name, model in models.items()},
+        "scenarios": {
+            " ".join(filter(None, (batch.scenario.name, batch.variation))): batch.scenario.model_dump(mode="json")
+            for batch in batches
+        },
+        "encounters": _digest("".join(digests[id(batch.encounters)] for batch in batches)),
+        "plugins": {plugin.name: hashlib.sha256(plugin.read_bytes()).hexdigest()[:16] for plugin in request.plugins},
+    }
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
