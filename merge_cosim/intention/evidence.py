@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
@@ -10,6 +11,16 @@ from merge_cosim.units import FloatArray, IntArray
 
 LogRatio = Callable[[FloatArray, FloatArray], FloatArray]
 """From the speeds before and now [m/s] to `log P(now | before, N) - log P(now | before, Y)`, all of shape (n,)."""
+
+
+class SpeedDensity(Protocol):
+    """P(V_t | V_{t-lag}, I), in whatever form."""
+
+    def log_ratio(self, before: FloatArray, now: FloatArray) -> FloatArray:
+        """`log P(now | before, N) - log P(now | before, Y)`, shape (n,)."""
+
+    def log_density(self, before: FloatArray, now: FloatArray) -> FloatArray:
+        """`log P(now | before, I)` per m/s, shape (2, n)."""
 
 
 class SpeedEvidence:
