@@ -43,28 +43,30 @@ class SpeedEvidence:
 
     def start(self, count: int) -> None:
         """Make room for `count` drivers. Rings are shared: a driver who begins later finds zeros in his."""
-        self._cycle = 0
-        self._age = np.zeros(count, dtype=np.int64)
+        self._cycle, self._settled = 0, self._lag
+        self._begin = np.zeros(count, dtype=np.int64)
         self._sum = np.zeros(count)
         self._terms = np.zeros((self._window, count))
         self._speeds = np.zeros((self._lag, count))
 
     def reset(self, rows: IntArray) -> None:
         """Forget the drivers at `rows`."""
-        self._age[rows] = 0
+        self._begin[rows] = self._cycle
+        self._settled = self._cycle + self._lag
         self._sum[rows] = 0.0
         self._terms[:, rows] = 0.0
 
     def add(self, speed: FloatArray) -> FloatArray:
         """Take in the speeds of one cycle [m/s] and return S_t; both of shape (n,)."""
         before = self._speeds[self._cycle % self._lag]
-        ratio = self._log_ratio(before, speed) * (self._age >= self._lag)
+        ratio = self._log_ratio(before, speed)
+        if self._cycle < self._settled:  # somebody has no speed `lag` cycles ago; for all others this is times 1
+            ratio *= self._begin <= self._cycle - self._lag
         if self._lag > 1:
             ratio /= self._lag
         before[:] = speed
         oldest = self._terms[self._cycle % self._window]
         self._sum = self._keep * self._sum + (ratio - self._left * oldest)
         oldest[:] = ratio
-        self._age += 1
         self._cycle += 1
         return self._sum

@@ -70,7 +70,7 @@ class SpeedGaussian:
 
     def log_ratio(self, before: FloatArray, now: FloatArray) -> FloatArray:
         """Evidence for NOT_YIELD in the transition of each car, shape (n,)."""
-        constant, linear, square = self._parabolas[:, wide_bin(before)]
+        constant, linear, square = self._parabolas.take(wide_bin(before), axis=1)
         change = now - before
         ratio: FloatArray = constant + change * (linear + change * square)
         return ratio
