@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import pkgutil
+import re
 import sys
 from abc import ABC
 from collections.abc import Callable, Mapping
@@ -94,6 +96,17 @@ def did_you_mean(name: str, choices: Mapping[str, Any] | list[str]) -> str:
 def parameters(cls: type) -> dict[str, Any]:
     """Names and defaults of a component's parameters: its dataclass fields."""
     return {f.name: f.default for f in fields(cls) if f.init}
+
+
+def meanings(cls: type) -> dict[str, str]:
+    """What each parameter means: its entry under `Attributes:` in the docstring of its class or a base."""
+    found: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        _, _, attributes = inspect.cleandoc(base.__dict__.get("__doc__") or "").partition("\nAttributes:\n")
+        for entry in re.split(r"\n {4}(?=\S)", "\n" + attributes)[1:]:
+            name, _, meaning = entry.partition(":")
+            found[name] = " ".join(meaning.split())
+    return {name: found.get(name, "") for name in parameters(cls)}
 
 
 def validated(cls: Callable[..., C], values: Mapping[str, Any], where: str) -> C:

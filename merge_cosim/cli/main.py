@@ -166,7 +166,7 @@ def train(
     seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
     json: Json = False,
 ) -> None:
-    """Learn speed transitions, times to arrival and the prior from one third of a site's pairs."""
+    """Learn speed transitions, times to arrival and the prior from one third of a site's pairs, and judge the rest."""
     from merge_cosim.experiments.training import train as train_model
     from merge_cosim.ngsim.data import find_data
 
@@ -178,6 +178,7 @@ def train(
             f"{out}: trained on {report['train_pairs']} pairs of {report['train_cars']} cars ({report['source']})"
         )
         show_table(report["held_out"], "held-out merging cars, by distance to the merging point")
+        show_table(report["densities"], "-log P(V_t | V_t-1, I) per transition of held-out cars; less is better")
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""What is learned from data, as counts in one small readable file, and the tables made from them."""
+"""What is learned from data: counts and fitted densities in one small readable file."""
 
 from __future__ import annotations
 
@@ -11,22 +11,49 @@ import numpy as np
 
 from merge_cosim.encounter import Intention
 from merge_cosim.errors import UserError
+from merge_cosim.intention.gaussian import SpeedGaussian
+from merge_cosim.intention.histogram import SPEED_BINS, TIME_BINS, ArrivalHistogram, SpeedHistogram
+from merge_cosim.intention.mixture import SpeedMixture
 from merge_cosim.units import FloatArray, IntArray
 
 SCHEMA = 2
-SPEED_BIN = 1.0
-"""Width of a speed bin [m/s] (Dong, Dolan, Litkouhi 2017, Sec. IV-A)."""
-SPEED_BINS = 40
-TIME_BIN = 0.5
-"""Width of a bin of time to arrival [s]."""
-TIME_BINS = 30
 MODELS = Path(__file__).parent / "models"
 """Where the models that come with the project lie."""
 
 
 @dataclass(frozen=True)
+class SpeedModel:
+    """P(V_t | V_{t-lag}, I) for one lag, in three forms.
+
+    Attributes:
+        histogram: Counts of transitions, for PGM and FG.
+        gaussian: One Gaussian per speed bin, for PGM-G.
+        mixture: A mixture over both speeds, for FG-GMM.
+    """
+
+    histogram: SpeedHistogram
+    gaussian: SpeedGaussian
+    mixture: SpeedMixture
+
+    @classmethod
+    def fit(cls, before: FloatArray, now: FloatArray, label: IntArray) -> SpeedModel:
+        """Fit all three to the same transitions.
+
+        Args:
+            before: Speeds [m/s], shape (n,).
+            now: Speeds `lag` cycles later [m/s], shape (n,).
+            label: Intention of each transition's driver, shape (n,).
+
+        Raises:
+            UserError: There are too few transitions of an intention.
+        """
+        data = before, now, label
+        return cls(SpeedHistogram.fit(*data), SpeedGaussian.fit(*data), SpeedMixture.fit(*data))
+
+
+@dataclass(frozen=True)
 class IntentionModel:
-    """Counts over training pairs; index 0 is YIELD, index 1 NOT_YIELD.
+    """What was learned from training pairs; index 0 is YIELD, index 1 NOT_YIELD.
 
     Attributes:
         name: Short name, shown in every row that rests on it.
@@ -35,10 +62,8 @@ class IntentionModel:
         settings: How the pairs were chosen and split, for the reader.
         pairs: Number of pairs per intention, shape (2,).
         merge_speed: Mean speed of the training merging cars at their lane change [m/s].
-        transitions: Counts of speed-bin transitions by lag in cycles, each (2, SPEED_BINS,
-            SPEED_BINS) as [I, from, to].
-        arrivals: Share of each pair's frames by time to arrival, summed over pairs, (2, TIME_BINS, TIME_BINS) as
-            [I, T_m, T_h].
+        speeds: Speed transitions by lag in cycles; see `speed`.
+        arrivals: Times to arrival of both cars.
     """
 
     name: str
@@ -48,48 +73,23 @@ class IntentionModel:
     settings: dict[str, Any]
     pairs: IntArray
     merge_speed: float
-    transitions: dict[int, IntArray]
-    arrivals: FloatArray
+    speeds: dict[int, SpeedModel]
+    arrivals: ArrivalHistogram
 
     @property
     def prior_log_odds(self) -> float:
         """`log P(N) - log P(Y)`, from the shares of the training pairs."""
         return float(np.log(self.pairs[Intention.NOT_YIELD]) - np.log(self.pairs[Intention.YIELD]))
 
-    def speed_probabilities(self, lag: int, epsilon: float) -> FloatArray:
-        """Return P(V_t | V_{t-lag}, I), shape (2, SPEED_BINS, SPEED_BINS) as [I, from, to].
-
-        `P = (1 - eps) n_I(ij) / n_I(i) + eps Q(j|i)`; Q pools both intentions under a kernel of one bin and stands
-        alone where either intention has never been seen in a row. (With additive counts every unseen transition would
-        speak for the rarer intention.)
+    def speed(self, lag: int) -> SpeedModel:
+        """Return the speed transitions over `lag` cycles.
 
         Raises:
             UserError: The model was not trained for this lag.
         """
-        if lag not in self.transitions:
-            raise UserError(
-                f"model {self.name}: no transitions for transition_lag {lag} (has {sorted(self.transitions)})"
-            )
-        counts = self.transitions[lag].astype(np.float64)
-        pooled = _blurred(counts.sum(axis=0))
-        background = _normalised_rows(pooled)
-        own = np.stack([_normalised_rows(count) for count in counts])
-        seen = (counts.sum(axis=2) > 0).all(axis=0)[None, :, None]
-        return np.where(seen, (1.0 - epsilon) * own + epsilon * background, background)
-
-    def speed_log_odds(self, lag: int, epsilon: float) -> FloatArray:
-        """Return `log P(V_t | V_{t-lag}, N) - log P(V_t | V_{t-lag}, Y)`, (SPEED_BINS, SPEED_BINS); 0 where unknown."""
-        return _log_ratio(self.speed_probabilities(lag, epsilon))
-
-    def time_probabilities(self, uniform: float) -> FloatArray:
-        """Return P(T_m, T_h | I), shape (2, TIME_BINS, TIME_BINS), smoothed by one bin and mixed with uniform."""
-        smooth = np.stack([_blurred(one) for one in self.arrivals])
-        shares = smooth / smooth.sum(axis=(1, 2), keepdims=True)
-        return (1.0 - uniform) * shares + uniform / shares[0].size
-
-    def time_log_odds(self, uniform: float) -> FloatArray:
-        """Return `log P(T_m, T_h | N) - log P(T_m, T_h | Y)`, shape (TIME_BINS, TIME_BINS)."""
-        return _log_ratio(self.time_probabilities(uniform))
+        if lag not in self.speeds:
+            raise UserError(f"model {self.name}: no transitions for transition_lag {lag} (has {sorted(self.speeds)})")
+        return self.speeds[lag]
 
     def to_json(self) -> str:
         """The model as text, one entry per line, counts as sparse lists."""
@@ -99,13 +99,15 @@ class IntentionModel:
             "site": self.site,
             "source": self.source,
             "settings": self.settings,
-            "pairs": {intention.name: int(self.pairs[intention]) for intention in _BOTH},
+            "pairs": _by_intention(self.pairs),
             "merge_speed": self.merge_speed,
             "transitions": {
-                str(lag): {intention.name: _sparse(counts[intention]) for intention in _BOTH}
-                for lag, counts in self.transitions.items()
+                str(lag): {i.name: _sparse(speed.histogram.counts[i]) for i in _BOTH}
+                for lag, speed in self.speeds.items()
             },
-            "arrivals": {intention.name: _sparse(self.arrivals[intention].round(6)) for intention in _BOTH},
+            "gaussians": {str(lag): _fields(speed.gaussian) for lag, speed in self.speeds.items()},
+            "mixtures": {str(lag): _fields(speed.mixture) for lag, speed in self.speeds.items()},
+            "arrivals": {i.name: _sparse(self.arrivals.shares[i].round(6)) for i in _BOTH},
             "trained_on": list(self.trained_on),
         }
         rows = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in document.items())
@@ -138,13 +140,10 @@ class IntentionModel:
                 source=document["source"],
                 trained_on=tuple(document["trained_on"]),
                 settings=document["settings"],
-                pairs=np.array([document["pairs"][intention.name] for intention in _BOTH]),
+                pairs=_stacked(document["pairs"]),
                 merge_speed=float(document["merge_speed"]),
-                transitions={
-                    int(lag): np.stack([_dense(both[i.name], SPEED_BINS) for i in _BOTH]).astype(np.int64)
-                    for lag, both in document["transitions"].items()
-                },
-                arrivals=np.stack([_dense(document["arrivals"][intention.name], TIME_BINS) for intention in _BOTH]),
+                speeds={int(lag): _speed_model(document, lag) for lag in document["transitions"]},
+                arrivals=ArrivalHistogram(np.stack([_dense(document["arrivals"][i.name], TIME_BINS) for i in _BOTH])),
             )
         except (ValueError, KeyError, TypeError, IndexError) as error:
             raise UserError(f"{file}: not a merge-cosim model ({error!r}); make one with 'merge-cosim train'") from None
@@ -153,32 +152,25 @@ class IntentionModel:
 _BOTH = (Intention.YIELD, Intention.NOT_YIELD)
 
 
-def speed_bin(speed: FloatArray) -> IntArray:
-    """Index of each speed's bin, clipped to the table."""
-    return np.clip(speed / SPEED_BIN, 0, SPEED_BINS - 1).astype(np.int64)
+def _speed_model(document: dict[str, Any], lag: str) -> SpeedModel:
+    counts = [_dense(document["transitions"][lag][i.name], SPEED_BINS) for i in _BOTH]
+    return SpeedModel(
+        SpeedHistogram(np.stack(counts).astype(np.int64)),
+        SpeedGaussian(**{name: _stacked(both) for name, both in document["gaussians"][lag].items()}),
+        SpeedMixture(**{name: _stacked(both) for name, both in document["mixtures"][lag].items()}),
+    )
 
 
-def time_bin(time: FloatArray) -> IntArray:
-    """Index of each time to arrival's bin; times beyond the table fall into its last bin."""
-    return np.minimum(time / TIME_BIN, TIME_BINS - 1).astype(np.int64)
+def _fields(density: SpeedGaussian | SpeedMixture) -> dict[str, Any]:
+    return {name: _by_intention(getattr(density, name)) for name in type(density).__dataclass_fields__}
 
 
-def _blurred(counts: FloatArray) -> FloatArray:
-    from scipy.ndimage import gaussian_filter  # imported where a model is used: it is slow to import
-
-    return gaussian_filter(counts, sigma=1.0, mode="constant")
+def _by_intention(values: FloatArray | IntArray) -> dict[str, Any]:
+    return {i.name: values[i].tolist() for i in _BOTH}
 
 
-def _normalised_rows(counts: FloatArray) -> FloatArray:
-    total = counts.sum(axis=-1, keepdims=True)
-    return np.divide(counts, total, out=np.zeros_like(counts), where=total > 0)
-
-
-def _log_ratio(probabilities: FloatArray) -> FloatArray:
-    known = (probabilities > 0).all(axis=0)
-    logs = np.log(np.where(known, probabilities, 1.0))
-    ratio: FloatArray = logs[Intention.NOT_YIELD] - logs[Intention.YIELD]
-    return ratio
+def _stacked(both: dict[str, Any]) -> Any:
+    return np.array([both[i.name] for i in _BOTH])
 
 
 def _sparse(counts: FloatArray | IntArray) -> list[list[float]]:

@@ -38,18 +38,19 @@ def panel(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Any]:
     return figure, figure.add_subplot()
 
 
-def grid_of(count: int, across: int, cell: tuple[float, float]) -> tuple[Figure, list[Any]]:
+def grid_of(count: int, across: int, cell: tuple[float, float], sharex: bool = True) -> tuple[Figure, list[Any]]:
     """Make small multiples that share their axes; returns the figure and `count` axes, row by row.
 
     Args:
         count: Number of small panels.
         across: Most panels in a row.
         cell: Width and height of one [in].
+        sharex: They share the horizontal axis, too.
     """
     across = min(across, count)
     down = -(-count // across)
     figure = Figure(figsize=(cell[0] * across, cell[1] * down), layout="constrained")
-    axes = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel().tolist()
+    axes = figure.subplots(down, across, sharex=sharex, sharey=True, squeeze=False).ravel().tolist()
     for spare in axes[count:]:
         spare.remove()
     for above in axes[max(count - across, 0) : count]:

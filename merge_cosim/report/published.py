@@ -7,6 +7,8 @@ from dataclasses import dataclass
 PGM_PAPER = "Dong, Dolan, Litkouhi 2017 (PGM), Table II"
 FG_GMM_PAPER = "Lyu, Dong, Dolan 2020 (FG-GMM), Table III"
 
+MIXTURE_TABLE = "Lyu, Dong, Dolan 2020 (FG-GMM), Table I"
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -56,6 +58,36 @@ PUBLISHED: dict[str, dict[str, Figure]] = {
     },
 }
 """By scenario and method. Designed Test I is published over both sites together."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """One component of the published mixture over (V_{t-1}, V_t), in feet as printed.
+
+    The table prints one row of each covariance matrix, so the variance of V_t is not known and no conditional density
+    can be rebuilt.
+
+    Attributes:
+        weight: Its weight.
+        mean_before, mean_now: Its mean [ft/s].
+        variance: Variance of V_{t-1} [ft^2/s^2].
+        covariance: Covariance of both speeds [ft^2/s^2].
+        source: Paper and table.
+    """
+
+    weight: float
+    mean_before: float
+    mean_now: float
+    variance: float
+    covariance: float
+    source: str = MIXTURE_TABLE
+
+
+PUBLISHED_MIXTURES: dict[str, tuple[Component, Component]] = {
+    "YIELD": (Component(0.57, 17.59, 17.58, 64.04, 64.00), Component(0.42, 43.51, 43.50, 106.53, 106.77)),
+    "NOT_YIELD": (Component(0.56, 17.87, 17.87, 66.25, 66.20), Component(0.43, 44.02, 44.01, 106.96, 107.20)),
+}
+"""By intention, slower component first (the paper prints NOT_YIELD's the other way round)."""
 
 
 def published(scenario: str, method: str) -> Figure | None:

@@ -1,0 +1,50 @@
+"""The pages of the methods: their tables are those of the code, and their pictures and links are there."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from merge_cosim.intention.base import estimators
+from merge_cosim.registry import meanings
+
+ROOT = Path(__file__).parent.parent
+PAGES = sorted((ROOT / "docs" / "methods").glob("*.md"))
+
+
+@pytest.fixture(scope="module")
+def tool():
+    spec = importlib.util.spec_from_file_location("method_pages", ROOT / "tools" / "method_pages.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_parameters_are_those_of_the_code(page, tool):
+    text = page.read_text(encoding="utf-8")
+    assert tool.filled(text, {"parameters": tool.parameters}) == text, "run python tools/method_pages.py"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\((?!http)([^)#]+)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
+
+
+def test_a_stale_table_is_seen(tool):
+    stale = "<!-- parameters: estimator pgm -->\n| parameter | default |\n<!-- end -->"
+    made = tool.filled(stale, {"parameters": tool.parameters})
+    assert "| `pgm.nodes` | `52` | Number n of speed nodes;" in made
+    assert tool.filled(stale, {}) == stale
+
+
+@pytest.mark.parametrize("name", ["acc", "slot", "slot-time", "pgm", "pgm-g", "fg", "fg-gmm"])
+def test_every_method_has_a_page_that_names_it(name):
+    assert any(f"`{name}`" in page.read_text(encoding="utf-8") for page in PAGES)
+
+
+@pytest.mark.parametrize("name", estimators.names())
+def test_every_parameter_is_explained(name):
+    assert all(meanings(estimators[name]).values())

@@ -1,0 +1,108 @@
+"""Bring the pages of the methods up to date: python tools/method_pages.py [--data DIR] rewrites docs/methods/*.md.
+
+The pages are written by hand but for their blocks `<!-- KIND: ARGUMENT -->` ... `<!-- end -->`, which this fills:
+parameters of a component with their defaults (`parameters: estimator pgm`), and what held-out cars say of the densities
+(`densities: surrogate`, or `densities: ngsim`, which is left as it is without --data). It also draws what the shipped
+model learned.
+"""
+
+import argparse
+import re
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+from merge_cosim.control.base import controllers
+from merge_cosim.intention.base import estimators
+from merge_cosim.registry import Registry, meanings
+from merge_cosim.registry import parameters as defaults
+
+DOCS = Path(__file__).parent.parent / "docs"
+MODEL = "us101-ngsim"
+BLOCK = re.compile(r"<!-- (?P<kind>\w+): (?P<argument>[^>]+) -->\n.*?<!-- end -->", re.DOTALL)
+REGISTRIES: dict[str, Registry] = {"estimator": estimators, "controller": controllers}
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> str:
+    """A Markdown table, its first columns to the left, the others to the right."""
+    lines = [head, [*["---"] * left, *["---:"] * (len(head) - left)], *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def parameters(argument: str) -> str:
+    """The parameters of one component; `argument` is its role and name."""
+    role, name = argument.split()
+    cls = REGISTRIES[role][name]
+    values = defaults(cls)
+    rows = [[f"`{name}.{key}`", f"`{values[key]}`", meaning] for key, meaning in meanings(cls).items()]
+    return table(["parameter", "default", "meaning"], rows, left=3) if rows else "No parameters.\n"
+
+
+def densities(argument: str, data: Path | None = None) -> str | None:
+    """Losses of the densities on held-out cars; `argument` is the source."""
+    if argument == "ngsim" and data is None:
+        return None
+    from merge_cosim.experiments.judging import DENSITIES
+    from merge_cosim.experiments.training import train
+
+    with tempfile.TemporaryDirectory() as folder:
+        report = train("us101", data, argument, "car", 0, Path(folder) / "model.json")
+    rows = []
+    for row in report["densities"]:
+        losses = {name: row[name] for name in DENSITIES}
+        best = min(loss for loss in losses.values()) if row["histogram"] is not None else None
+        shown = ["-" if v is None else f"**{v:.2f}**" if v == best else f"{v:.2f}" for v in losses.values()]
+        counts = [str(row["transitions"]), str(row["ruled_out"])]
+        rows.append([row["speeds"], row["intention"], row["from_m_s"], *counts, *shown])
+    about = (
+        f"Trained on {report['train_pairs']} pairs of {report['train_cars']} cars, "
+        f"tested on {report['test_pairs']} pairs of {report['test_cars']}.\n\n"
+    )
+    head = ["speeds", "intention", "V(t-1) [m/s]", "transitions", "ruled out by the histogram", *DENSITIES]
+    return about + table(head, rows, left=2)
+
+
+def filled(text: str, kinds: Mapping[str, Callable[[str], str | None]]) -> str:
+    """A page with its blocks of these kinds filled anew; the others stay."""
+
+    def fill(block: re.Match[str]) -> str:
+        kind, argument = block["kind"], block["argument"]
+        made = kinds[kind](argument) if kind in kinds else None
+        return block[0] if made is None else f"<!-- {kind}: {argument} -->\n{made}<!-- end -->"
+
+    return BLOCK.sub(fill, text)
+
+
+def draw() -> None:
+    """Draw what the shipped model learned."""
+    from merge_cosim.intention.model import IntentionModel
+    from merge_cosim.report import canvas, model_figures
+
+    model = IntentionModel.load(MODEL)
+    folder = DOCS / "img" / "methods"
+    folder.mkdir(parents=True, exist_ok=True)
+    figures = {
+        "transitions": model_figures.transition_figure,
+        "arrivals": model_figures.arrival_figure,
+        "gaussians": model_figures.gaussian_figure,
+        "mixtures": model_figures.mixture_figure,
+    }
+    for name, figure in figures.items():
+        with canvas.style():
+            figure(model).savefig(folder / f"{name}.png", dpi=110, metadata={"Software": None})
+
+
+def main() -> None:
+    """Rewrite the pages and redraw the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, help="folder with real NGSIM files")
+    data = parser.parse_args().data
+    kinds = {"parameters": parameters, "densities": partial(densities, data=data)}
+    for page in sorted((DOCS / "methods").glob("*.md")):
+        page.write_text(filled(page.read_text(encoding="utf-8"), kinds), encoding="utf-8")
+    draw()
+
+
+if __name__ == "__main__":
+    main()
