@@ -23,9 +23,9 @@ class Pcb(IntendedAcceleration, Acc):
 
     Candidates a from `min_acceleration` to `max_acceleration` are held over `steps * step` seconds. For either
     intention the merging car drives `a_I` (`IntendedAcceleration`) up to the merging point and keeps its speed from
-    there; all speeds stay within [0, v_limit], steps are Euler's as the plant's. With the cost of a candidate
+    there. Speeds are `v + a t` cut to [0, v_limit], steps are Euler's as the plant's. With the cost of a candidate
 
-    `C_I(a) = progress * mean((v_limit - v) / v_limit) + comfort * (a / a_min)^2
+    `C_I(a) = progress * mean((v_limit - v) / v_limit) + comfort * (a / comfort_scale)^2
     + closeness * max_t exp(-max(gap, 0) / gap_scale) + overlap * [overlap at some t]`,
 
     t over the steps at which both stations are >= 0 and `gap` from bumper to bumper whoever leads, the command is
@@ -37,6 +37,7 @@ class Pcb(IntendedAcceleration, Acc):
         steps: Number of steps predicted.
         step: Length of a step [s].
         progress, comfort, closeness, overlap: Weights of the cost's terms.
+        comfort_scale: Acceleration at which discomfort is 1 [m/s^2].
         gap_scale: Gap at which closeness has fallen to 1/e [m].
     """
 
@@ -48,6 +49,7 @@ class Pcb(IntendedAcceleration, Acc):
     comfort: NonNegativeFloat = 0.1
     closeness: NonNegativeFloat = 10.0
     overlap: NonNegativeFloat = 1000.0
+    comfort_scale: PositiveFloat = 4.0
     gap_scale: PositiveFloat = 5.0
 
     def start(self, count: int, setting: Setting) -> None:
@@ -57,8 +59,7 @@ class Pcb(IntendedAcceleration, Acc):
         self.candidates = np.arange(self.min_acceleration, last, self.candidate_step)
         self._counted = np.arange(1, self.steps + 1.0)[:, None, None]
         self._speed_change = self._counted * (self.step * self.candidates[:, None])
-        hardest = max(-self.min_acceleration, TOLERANCE)
-        self._comfort = (self.comfort * (self.candidates / hardest) ** 2)[:, None]
+        self._comfort = (self.comfort * (self.candidates / self.comfort_scale) ** 2)[:, None]
 
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """The cheapest candidate; acc's law once the merging car is in the lane."""
