@@ -105,9 +105,7 @@ def test_batch_of_one_and_of_many_agree_to_the_bit():
     controller, odds = Pcb(means="arrival"), rng.normal(0, 3, n)
     controller.start(n, Setting())
     whole = controller.costs(Observation(station[0], speed[0], station[1], speed[1], *length))
-    commands = controller.command(
-        Observation(station[0], speed[0], station[1], speed[1], *length), odds, odds > 0
-    )
+    commands = controller.command(Observation(station[0], speed[0], station[1], speed[1], *length), odds, odds > 0)
     for i in range(n):
         one = Observation(*(a[i : i + 1] for a in (station[0], speed[0], station[1], speed[1], *length)))
         np.testing.assert_array_equal(controller.costs(one)[:, :, 0], whole[:, :, i])

@@ -43,7 +43,7 @@ def mean_of(maneuver, station, speed, arrival, **parameters):
 def test_action_model_by_hand():
     # free: 0.4 (15 - 14)
     assert mean_of(Maneuver.IGNORE, -50.0, 14.0, 3.0) == pytest.approx(0.4)
-    # to be 5 + 2 m behind the merging point after 3 s: 2 (-7 + 50 - 42) / 9; 4 + 2 m past it takes 2 (6 + 50 - 42) / 9, too much
+    # 5 + 2 m behind the merging point after 3 s: 2 (-7 + 50 - 42) / 9; 4 + 2 m past it: 2 (6 + 50 - 42) / 9 > 3
     assert mean_of(Maneuver.YIELD, -50.0, 14.0, 3.0) == pytest.approx(2 / 9)
     assert mean_of(Maneuver.NOT_YIELD, -50.0, 14.0, 3.0) == 3.0
     assert mean_of(Maneuver.NOT_YIELD, -45.0, 14.0, 3.0) == pytest.approx(2.0)

@@ -47,7 +47,7 @@ def test_log_odds_with_fixed_means():
 
 def test_means_by_arrival():
     estimator = ready(means="arrival")
-    # the host needs 5 s; 50 m at 10 m/s: after 6.5 s 2 (50 - 65) / 42.25, before 3.5 s 2 (50 - 35) / 12.25, beyond the bound
+    # the host needs 5 s; 50 m in 6.5 s: 2 (50 - 65) / 42.25; in 3.5 s: 2 (50 - 35) / 12.25, beyond the bound
     mean = estimator.intended(seen(10.0), 0.1)[:, 0]
     assert mean[Intention.YIELD] == pytest.approx(-30 / 42.25)
     assert mean[Intention.NOT_YIELD] == pytest.approx(2.0)
