@@ -130,7 +130,7 @@ def linear_steps(runs, particles):
         min_acceleration=-1e6,
         max_acceleration=1e6,
     )
-    scenes = pulls_ahead()[20:71]
+    scenes = stays_behind()[20:71]
     return watch(estimator, scenes, runs), scenes
 
 
