@@ -98,6 +98,12 @@ class DbnPf(Estimator):
     change_rate: NonNegativeFloat = 0.05
     redrawn: Share = 0.05
 
+    @property
+    def start_belief(self) -> FloatArray:
+        """Shares of the maneuvers before anything is seen, shape (3,)."""
+        rest = max(1.0 - self.start_yield - self.start_not_yield, 0.0)
+        return np.array([self.start_yield, self.start_not_yield, rest])
+
     def use(self, model: IntentionModel) -> None:
         """Take the speed that drivers merge at."""
         self._desired_speed = model.merge_speed
@@ -126,9 +132,7 @@ class DbnPf(Estimator):
         merging, host = seen.merging_arrival, seen.host_arrival
         first = np.flatnonzero(self._age == 0)
         if len(first):
-            start = np.array([self.start_yield, self.start_not_yield, 0.0])
-            start[Maneuver.IGNORE] = max(1.0 - self.start_yield - self.start_not_yield, 0.0)
-            belief = np.repeat(start[:, None], len(first), axis=1)
+            belief = np.repeat(self.start_belief[:, None], len(first), axis=1)
             cloud = self._drawn_at(seen, first, belief, self.particles)
             self._keep(first, cloud, belief, merging, host)
         due = np.flatnonzero((self._age > 0) & (self._age % self._cycles == 0))

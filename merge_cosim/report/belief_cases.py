@@ -38,7 +38,7 @@ def behind_but_accelerating(
         acceleration: Its acceleration [m/s^2].
         cycles: How many cycles are seen.
     """
-    back = np.arange(cycles - 1, -1, -1) * DT
+    back = np.arange(cycles - 1, -1, -1, dtype=np.float64) * DT
     speed = merging[1] - acceleration * back
     # Euler as the plant: the way from a cycle to the last is the sum of the later speeds
     way = np.concatenate([np.cumsum(speed[:0:-1])[::-1] * DT, [0.0]])
@@ -49,7 +49,7 @@ def _approach(acceleration: FloatArray) -> list[Observation]:
     cycles = len(acceleration) + 1
     speed = MERGING_SPEED + np.concatenate([[0.0], np.cumsum(acceleration * DT)])
     station = MERGING_START + np.concatenate([[0.0], np.cumsum(speed[1:] * DT)])
-    host = HOST_START + HOST_SPEED * DT * np.arange(cycles)
+    host = HOST_START + HOST_SPEED * DT * np.arange(cycles, dtype=np.float64)
     return _sequence(host, np.full(cycles, HOST_SPEED), station, speed)
 
 
@@ -57,5 +57,5 @@ def _sequence(
     host_station: FloatArray, host_speed: FloatArray, station: FloatArray, speed: FloatArray
 ) -> list[Observation]:
     length = np.array([LENGTH])
-    columns = zip(host_station, host_speed, station, speed, strict=True)
-    return [Observation(*(np.array([value]) for value in column), length, length) for column in columns]
+    states = np.stack([host_station, host_speed, station, speed])[:, :, None]
+    return [Observation(*states[:, t], host_length=length, merging_length=length) for t in range(len(speed))]
