@@ -57,5 +57,14 @@ def _sequence(
     host_station: FloatArray, host_speed: FloatArray, station: FloatArray, speed: FloatArray
 ) -> list[Observation]:
     length = np.array([LENGTH])
-    states = np.stack([host_station, host_speed, station, speed])[:, :, None]
-    return [Observation(*states[:, t], host_length=length, merging_length=length) for t in range(len(speed))]
+    return [
+        Observation(
+            host_station=host_station[t : t + 1],
+            host_speed=host_speed[t : t + 1],
+            merging_station=station[t : t + 1],
+            merging_speed=speed[t : t + 1],
+            host_length=length,
+            merging_length=length,
+        )
+        for t in range(len(speed))
+    ]
