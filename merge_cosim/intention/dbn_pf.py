@@ -98,6 +98,10 @@ class DbnPf(Estimator):
     change_rate: NonNegativeFloat = 0.05
     redrawn: Share = 0.05
 
+    def __post_init__(self) -> None:
+        if self.start_yield + self.start_not_yield > 1.0 + TOLERANCE:
+            raise ValueError("start_yield and start_not_yield are more than 1 together")
+
     @property
     def start_belief(self) -> FloatArray:
         """Shares of the maneuvers before anything is seen, shape (3,)."""

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from merge_cosim.errors import UserError
+from merge_cosim.intention.base import estimators
 from merge_cosim.intention.dbn_pf import DbnPf, Maneuver
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.intention.particles import Cloud
@@ -208,3 +210,9 @@ def test_without_change_or_redraw_a_lost_maneuver_stays_lost():
     np.testing.assert_allclose(watched(pulls_ahead(), fixed, 40), -CEILING)
     free = ready(40, start_yield=1.0, start_not_yield=0.0)
     assert np.median(np.array(watched(pulls_ahead(), free, 40))[-1]) > 0
+
+
+def test_shares_at_the_start_that_exceed_one_are_refused():
+    with pytest.raises(UserError, match="more than 1 together"):
+        estimators.build("dbn-pf", {"start_yield": 0.7}, "dbn-pf")
+    np.testing.assert_allclose(DbnPf(start_yield=0.6).start_belief, [0.6, 0.4, 0.0], atol=1e-12)
