@@ -3,7 +3,7 @@
 The pages are written by hand but for their blocks `<!-- KIND: ARGUMENT -->` ... `<!-- end -->`, which this fills:
 parameters of a component with their defaults (`parameters: estimator pgm`), and what held-out cars say of the densities
 (`densities: surrogate`, or `densities: ngsim`, which is left as it is without --data). It also draws what the shipped
-model learned.
+model learned, and what the estimators believe.
 """
 
 import argparse
@@ -75,9 +75,9 @@ def filled(text: str, kinds: Mapping[str, Callable[[str], str | None]]) -> str:
 
 
 def draw() -> None:
-    """Draw what the shipped model learned."""
+    """Draw what the shipped model learned, and what the estimators believe."""
     from merge_cosim.intention.model import IntentionModel
-    from merge_cosim.report import canvas, model_figures
+    from merge_cosim.report import belief_figures, canvas, model_figures
 
     model = IntentionModel.load(MODEL)
     folder = DOCS / "img" / "methods"
@@ -87,6 +87,9 @@ def draw() -> None:
         "arrivals": model_figures.arrival_figure,
         "gaussians": model_figures.gaussian_figure,
         "mixtures": model_figures.mixture_figure,
+        "dbn-pf-clouds": belief_figures.clouds_figure,
+        "dbn-pf-belief": belief_figures.belief_figure,
+        "ipcb-candidates": belief_figures.candidates_figure,
     }
     for name, figure in figures.items():
         with canvas.style():

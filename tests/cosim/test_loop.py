@@ -47,7 +47,7 @@ def test_sumo_drives_as_the_closed_form_does(ramp, merge_position):
     np.testing.assert_array_equal(sumo.columns["kind"], closed.columns["kind"])
 
 
-@pytest.mark.parametrize("method", ["slot", "pgm"])
+@pytest.mark.parametrize("method", ["slot", "pgm", "ipcb", "dbn-pf"])
 def test_tile_count_does_not_matter(method):
     encounters = random_encounters(150, seed=2)
     reference = on_sumo("designed", 1, encounters, method)
