@@ -139,6 +139,7 @@ def export(
     set_: Sets = None,
     data: Data = None,
     source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    json: Json = False,
 ) -> None:
     """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us."""
     from merge_cosim.experiments.methods import parse_setting
@@ -148,7 +149,11 @@ def export(
 
     settings = dict(map(parse_setting, set_ or ()))
     request = SweepRequest([scenario], ["acc"], settings=settings, data=find_data(data), source=source)
-    typer.echo(export_case(request, case, out))
+    file = export_case(request, case, out)
+    if json:
+        print_json({"sumocfg": str(file)})
+    else:
+        typer.echo(file)
 
 
 @app.command()
@@ -246,10 +251,20 @@ def _listed(row: dict[str, object]) -> str:
 
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
+    import sys
+
     try:
-        app()
+        sys.exit(app(standalone_mode=False))
+    except typer.BadParameter.__bases__ as error:  # typer's UsageError, which has no public name in all versions
+        message = error.format_message()
+        if "\n" in message:  # the help, for want of any argument
+            error.show()
+            sys.exit(2)
+        die(f"{message} (see --help)")
     except UserError as error:
         die(str(error))
+    except OSError as error:  # a full disk, a folder without permission: the user's to mend, wherever it strikes
+        die(f"{error.filename}: cannot be read or written ({error.strerror})" if error.filename else str(error))
 
 
 if __name__ == "__main__":

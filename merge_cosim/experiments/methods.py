@@ -141,7 +141,10 @@ def parse_variation(text: str) -> tuple[str, list[Any]]:
     Raises:
         UserError: It is neither.
     """
-    name, values = parse_setting(text)
+    name, equals, written = text.partition("=")
+    if not equals or not name or not written:
+        raise UserError(f"--vary {text}: write NAME=A:B:STEP or NAME=X,Y,Z")
+    name, values = name.strip(), parse_value(written.strip())
     if not isinstance(values, str):
         return name, [values]
     if ":" not in values:
