@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import typer
 
@@ -26,6 +26,9 @@ SHOWN = (
     *("censored", "host_not_reached", "distance_m", "delay_s", "hardest_braking", "unnecessary_yields", "cycle_us"),
 )
 """Columns of the summary that fit a terminal."""
+
+USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
+"""typer's UsageError; typer gives it no public name."""
 
 Source = Literal["ngsim", "surrogate"]
 Data = Annotated[Path | None, typer.Option(help="Folder with NGSIM files (else $MERGE_COSIM_DATA, else ./data).")]
@@ -255,7 +258,7 @@ def main() -> None:
 
     try:
         sys.exit(app(standalone_mode=False))
-    except typer.BadParameter.__bases__ as error:  # typer's UsageError, which has no public name in all versions
+    except USAGE_ERROR as error:
         message = error.format_message()
         if "\n" in message:  # the help, for want of any argument
             error.show()

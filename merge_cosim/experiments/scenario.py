@@ -23,8 +23,13 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
 
+def steps_between(first: float, last: float, step: float) -> int:
+    """How many whole steps fit between two values, with a grain of tolerance for rounding."""
+    return math.floor((last - first) / step + 1e-9)
+
+
 class Span(_Strict):
-    """Evenly spaced values, both ends included."""
+    """Evenly spaced values: `from`, and so on in steps as far as `to`, which is included where a step meets it."""
 
     first: float = Field(alias="from")
     last: float = Field(alias="to")
@@ -32,7 +37,7 @@ class Span(_Strict):
 
     def values(self) -> list[float]:
         """All values, in order."""
-        return [self.first + i * self.step for i in range(round((self.last - self.first) / self.step) + 1)]
+        return [self.first + i * self.step for i in range(steps_between(self.first, self.last, self.step) + 1)]
 
     @model_validator(mode="after")
     def _upwards(self) -> Span:
