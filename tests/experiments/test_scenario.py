@@ -22,5 +22,5 @@ def test_no_value_lies_beyond_the_end(first, last, step, values):
 
 @pytest.mark.parametrize("text", ["acc.d0", "acc.d0=", "acc.d0=1:2", "acc.d0=2:1:1", "acc.d0=1:2:0", "acc.d0=1:inf:1"])
 def test_what_cannot_be_varied_is_refused(text):
-    with pytest.raises(UserError, match="--vary acc.d0"):
+    with pytest.raises(UserError, match=r"--vary acc\.d0"):
         parse_variation(text)
