@@ -40,7 +40,9 @@ def test_a_stale_table_is_seen(tool):
     assert tool.filled(stale, {}) == stale
 
 
-@pytest.mark.parametrize("name", ["acc", "slot", "slot-time", "ipcb", "pgm", "pgm-g", "fg", "fg-gmm", "dbn-pf", "pcb", "lqr"])
+@pytest.mark.parametrize(
+    "name", ["acc", "slot", "slot-time", "ipcb", "pgm", "pgm-g", "fg", "fg-gmm", "dbn-pf", "pcb", "lqr"]
+)
 def test_every_method_has_a_page_that_names_it(name):
     assert any(f"`{name}`" in page.read_text(encoding="utf-8") for page in PAGES)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import typer
 
@@ -26,6 +26,9 @@ SHOWN = (
     *("censored", "host_not_reached", "distance_m", "delay_s", "hardest_braking", "unnecessary_yields", "cycle_us"),
 )
 """Columns of the summary that fit a terminal."""
+
+USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
+"""typer's UsageError; typer gives it no public name."""
 
 Source = Literal["ngsim", "surrogate"]
 Start = Literal["spawn", "fork"]
@@ -144,6 +147,7 @@ def export(
     set_: Sets = None,
     data: Data = None,
     source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    json: Json = False,
 ) -> None:
     """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us."""
     from merge_cosim.experiments.methods import parse_setting
@@ -153,7 +157,11 @@ def export(
 
     settings = dict(map(parse_setting, set_ or ()))
     request = SweepRequest([scenario], ["acc"], settings=settings, data=find_data(data), source=source)
-    typer.echo(export_case(request, case, out))
+    file = export_case(request, case, out)
+    if json:
+        print_json({"sumocfg": str(file)})
+    else:
+        typer.echo(file)
 
 
 @app.command()
@@ -252,10 +260,20 @@ def _listed(row: dict[str, object]) -> str:
 
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
+    import sys
+
     try:
-        app()
+        sys.exit(app(standalone_mode=False))
+    except USAGE_ERROR as error:
+        message = error.format_message()
+        if "\n" in message:  # the help, for want of any argument
+            error.show()
+            sys.exit(2)
+        die(f"{message} (see --help)")
     except UserError as error:
         die(str(error))
+    except OSError as error:  # a full disk, a folder without permission: the user's to mend, wherever it strikes
+        die(f"{error.filename}: cannot be read or written ({error.strerror})" if error.filename else str(error))
 
 
 if __name__ == "__main__":

@@ -58,16 +58,21 @@ def check_(which: Which, as_json: Json = False) -> None:
 
 
 @app.command("build")
-def build_(which: Which) -> None:
+def build_(which: Which, as_json: Json = False) -> None:
     """Build a ramp's net from its plain XML sources with netconvert."""
+    import json
+
     from merge_cosim.ramps.build import build, check
     from merge_cosim.ramps.ramp import find_ramp
 
     folder = find_ramp(which)
-    print(f"wrote {build(folder)}")
+    net = build(folder)
     problems = check(folder)
+    if as_json:
+        print(json.dumps({"net": str(net), "problems": problems}, indent=2))
+    else:
+        print("\n".join([f"wrote {net}", *problems]))
     if problems:
-        print("\n".join(problems))
         raise typer.Exit(1)
 
 
@@ -87,11 +92,18 @@ def new(
     upstream: Annotated[float, typer.Option(min=1.0, help="Road and on-ramp before the gore [m].")] = 500.0,
     downstream: Annotated[float, typer.Option(min=1.0, help="Road after the gore [m].")] = 1500.0,
     speed_limit: Annotated[float, typer.Option(min=1.0, help="Speed limit [m/s].")] = 29.0,
+    as_json: Json = False,
 ) -> None:
     """Start a ramp of your own from a copy of the designed one."""
+    import json
+
     from merge_cosim.ramps.build import check
     from merge_cosim.ramps.new import new_ramp
 
     folder = new_ramp(out / name, upstream, downstream, speed_limit)
-    print("\n".join([f"wrote {folder}", *check(folder)]))
+    problems = check(folder)
+    if as_json:
+        print(json.dumps({"folder": str(folder), "problems": problems}, indent=2))
+        return
+    print("\n".join([f"wrote {folder}", *problems]))
     print(f"Change it with: merge-cosim ramp edit {folder}")

@@ -226,7 +226,7 @@ class _Loop:
         for row in np.flatnonzero(np.isin(self.case, list(self.traced))).tolist():
             trace = self.traces[int(self.case[row])]
             for name, value in (
-                ("time_s", self.age[row] * self.setting.dt),
+                ("time_s", round(self.age[row] * self.setting.dt, 9)),
                 ("host_station_m", now.host_station[row]),
                 ("host_speed_m_s", now.host_speed[row]),
                 ("host_acceleration_m_s2", (next_speed[row] - now.host_speed[row]) / self.setting.dt),

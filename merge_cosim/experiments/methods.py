@@ -11,7 +11,7 @@ from merge_cosim.control.base import controllers
 from merge_cosim.cosim.loop import Driver
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import SECTIONS
+from merge_cosim.experiments.scenario import SECTIONS, steps_between
 from merge_cosim.intention.base import estimators
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.registry import did_you_mean, parameters
@@ -136,20 +136,23 @@ def parse_setting(text: str) -> tuple[str, Any]:
 
 
 def parse_variation(text: str) -> tuple[str, list[Any]]:
-    """Read `NAME=A:B:STEP` (both ends included) or `NAME=X,Y,Z`.
+    """Read `NAME=A:B:STEP` (B included where a step meets it) or `NAME=X,Y,Z`.
 
     Raises:
         UserError: It is neither.
     """
-    name, values = parse_setting(text)
+    name, equals, written = text.partition("=")
+    if not equals or not name or not written:
+        raise UserError(f"--vary {text}: write NAME=A:B:STEP or NAME=X,Y,Z")
+    name, values = name.strip(), parse_value(written.strip())
     if not isinstance(values, str):
         return name, [values]
     if ":" not in values:
         return name, [parse_value(value.strip()) for value in values.split(",")]
     try:
         first, last, step = (float(part) for part in values.split(":"))
-        count = round((last - first) / step)
-    except (ValueError, ZeroDivisionError):
+        count = steps_between(first, last, step)
+    except (ValueError, ZeroDivisionError, OverflowError):
         count = -1
     if count < 0:
         raise UserError(f"--vary {text}: write NAME=A:B:STEP with A <= B, or NAME=X,Y,Z")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -31,8 +33,13 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
 
+def steps_between(first: float, last: float, step: float) -> int:
+    """How many whole steps fit between two values, with a grain of tolerance for rounding."""
+    return math.floor((last - first) / step + 1e-9)
+
+
 class Span(_Strict):
-    """Evenly spaced values, both ends included."""
+    """Evenly spaced values: `from`, and so on in steps as far as `to`, which is included where a step meets it."""
 
     first: float = Field(alias="from")
     last: float = Field(alias="to")
@@ -40,7 +47,22 @@ class Span(_Strict):
 
     def values(self) -> list[float]:
         """All values, in order."""
-        return [self.first + i * self.step for i in range(round((self.last - self.first) / self.step) + 1)]
+        return [self.first + i * self.step for i in range(steps_between(self.first, self.last, self.step) + 1)]
+
+    @model_validator(mode="after")
+    def _upwards(self) -> Span:
+        if not self.first <= self.last < math.inf:
+            raise ValueError("'from' must not be greater than 'to', and both must be finite")
+        return self
+
+
+def _forwards(span: Span) -> Span:
+    if span.first < 0:
+        raise ValueError("a speed must not be negative")
+    return span
+
+
+Speeds = Annotated[Span, AfterValidator(_forwards)]
 
 
 class Grid(_Strict):
@@ -49,16 +71,16 @@ class Grid(_Strict):
     Attributes:
         merging_station: The merging car's initial station [m].
         host_offset: The host's initial station minus the merging car's [m]; positive is ahead.
-        host_speed: The host's initial speeds [m/s].
-        merging_speed: The merging car's initial speeds [m/s].
+        host_speed: The host's initial speeds [m/s], none negative.
+        merging_speed: The merging car's initial speeds [m/s], none negative.
         length: Length of both cars [m].
     """
 
     kind: Literal["grid"]
     merging_station: Annotated[float, Field(lt=0)] = -90.0
     host_offset: Span
-    host_speed: Span
-    merging_speed: Span
+    host_speed: Speeds
+    merging_speed: Speeds
     length: PositiveFloat = 5.0
 
 
@@ -168,7 +190,7 @@ class Scenario(_Strict):
             UserError: There is no such model or parameter.
         """
         values = dict(self.merging)
-        return merging_cars.build(str(values.pop("model", "")), values, f"scenario {self.name}, [merging]")
+        return merging_cars.build(str(values.pop("model", "")), values, "[merging]")
 
     @property
     def is_replay(self) -> bool:
@@ -205,7 +227,10 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
         scenario = Scenario.model_validate({"name": file.stem, **document})
     except ValidationError as error:
         raise UserError(f"{file}: {_first_problem(error)}") from None
-    scenario.merging_car()
+    try:
+        scenario.merging_car()
+    except UserError as error:
+        raise UserError(f"{file}: {error}") from None
     return scenario
 
 
@@ -245,14 +270,24 @@ _KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules]] =
 }
 
 
+_KINDS = "grid, random, pairs, routes"
+
+
 def _first_problem(error: ValidationError) -> str:
     first = min(error.errors(), key=lambda one: one["type"] == "missing")  # a misspelt key is missing, too
     *place, key = first["loc"]
     shown = ".".join(str(part) for part in first["loc"] if part not in ("grid", "random", "pairs", "routes", "[key]"))
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         section = _KNOWN.get(tuple(str(part) for part in place), Span)
-        known = section.model_fields if issubclass(section, BaseModel) else parameters(section)
-        return f"unknown key '{shown}'{did_you_mean(str(key), list(known))}"
+        if issubclass(section, BaseModel):
+            known = [field.alias or name for name, field in section.model_fields.items()]
+        else:
+            known = list(parameters(section))
+        return f"unknown key '{shown}'{did_you_mean(str(key), known)}"
     if first["type"] == "missing":
         return f"the key '{shown}' is missing"
-    return f"{shown} = {first['input']!r}: {first['msg']}"
+    if first["type"] == "union_tag_not_found":
+        return f"the key '{shown}.kind' is missing (choose from: {_KINDS})"
+    if first["type"] == "union_tag_invalid":
+        return f"{shown}.kind = {first['input']['kind']!r}: there is no such kind (choose from: {_KINDS})"
+    return f"{shown} = {first['input']!r}: {first['msg'].removeprefix('Value error, ')}"

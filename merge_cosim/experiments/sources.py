@@ -12,8 +12,9 @@ import numpy as np
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.scenario import Grid, Pairs, Random, Routes, Scenario
+from merge_cosim.ngsim.data import data_files, episode_files, load_trajectories
 from merge_cosim.ngsim.encounters import at_site_point, site_encounters
-from merge_cosim.ngsim.sites import site
+from merge_cosim.ngsim.sites import SITES, site
 from merge_cosim.ngsim.split import split_cars
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.route_reader import read_sumocfg
@@ -62,18 +63,35 @@ def _part(encounters: Encounters, pairs: Pairs, part: Literal["train", "test", "
 
 
 def pairs_of_site(name: str, pairs: Pairs, data: Path | None, source: SourceChoice | None) -> Encounters:
-    """All pairs of one site, real or surrogate."""
+    """All pairs of one site, real or surrogate.
+
+    Raises:
+        UserError: Real data are asked for and absent, or the data folder holds nothing of any site, or a damaged file.
+    """
     real = None if source == "surrogate" or data is None else site_encounters(data, site(name), pairs.rules)
     if real is not None and not len(real):
         real = None
     if real is None and source == "ngsim":
         where = data or "no data folder (give --data DIR or set MERGE_COSIM_DATA)"
         raise UserError(f"{where}: no {name} pairs in real NGSIM data; leave out --source ngsim to use the surrogate")
+    if real is None and source is None and data is not None:
+        _refuse_nothing(data)
     if real is None:
         folder = surrogate_folder(site(name))
         real = site_encounters(folder, site(name), pairs.rules, source="surrogate")
         assert real is not None
     return real
+
+
+def _refuse_nothing(data: Path) -> None:
+    """Refuse a folder that can stand for no site at all: who names one does not expect the surrogate."""
+    if any(load_trajectories(data, one) is not None for one in SITES) or episode_files(data):
+        return
+    notes = "; ".join(f"{file.path.name}: {file.note}" for file in data_files(data) if file.note)
+    raise UserError(
+        f"{data}: no row of {' or '.join(one.name for one in SITES)} in any NGSIM file there"
+        f"{f' ({notes})' if notes else ''}; leave it out, or add --source surrogate, to use the surrogate"
+    )
 
 
 def _grid(grid: Grid) -> Encounters:

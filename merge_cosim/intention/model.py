@@ -134,7 +134,7 @@ class IntentionModel:
             document = json.loads(file.read_text(encoding="utf-8"))
             if document["schema"] != SCHEMA:
                 raise UserError(f"{file}: model schema {document['schema']}, expected {SCHEMA}; train it again")
-            return cls(
+            model = cls(
                 name=document["name"],
                 site=document["site"],
                 source=document["source"],
@@ -145,6 +145,9 @@ class IntentionModel:
                 speeds={int(lag): _speed_model(document, lag) for lag in document["transitions"]},
                 arrivals=ArrivalHistogram(np.stack([_dense(document["arrivals"][i.name], TIME_BINS) for i in _BOTH])),
             )
+            if not ((model.pairs > 0).all() and (model.arrivals.sum(axis=(1, 2)) > 0).all()):
+                raise ValueError("one intention has no pairs or no arrivals")
+            return model
         except (ValueError, KeyError, TypeError, IndexError) as error:
             raise UserError(f"{file}: not a merge-cosim model ({error!r}); make one with 'merge-cosim train'") from None
 
@@ -180,5 +183,7 @@ def _sparse(counts: FloatArray | IntArray) -> list[list[float]]:
 def _dense(entries: list[list[float]], size: int) -> FloatArray:
     counts = np.zeros((size, size))
     for i, j, count in entries:
+        if not 0 <= count < np.inf:
+            raise ValueError(f"{count} is no count")
         counts[int(i), int(j)] = count
     return counts

@@ -44,7 +44,7 @@ class DataFile:
 
 
 def find_data(option: Path | None) -> Path | None:
-    """Return the data folder (or file): the option, else `$MERGE_COSIM_DATA`, else `./data`, else None.
+    """Return the data folder (or file): the option, else `$MERGE_COSIM_DATA`, else `./data` unless empty, else None.
 
     Raises:
         UserError: What the option or the variable names does not exist.
@@ -57,7 +57,8 @@ def find_data(option: Path | None) -> Path | None:
         if not Path(named).exists():
             raise UserError(f"{named}: no such folder (from ${ENVIRONMENT})")
         return Path(named)
-    return Path("data") if Path("data").is_dir() else None
+    usual = Path("data")
+    return usual if usual.is_dir() and any(usual.iterdir()) else None
 
 
 def data_files(data: Path) -> list[DataFile]:

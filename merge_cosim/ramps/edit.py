@@ -15,7 +15,7 @@ from merge_cosim.ramps.build import config
 
 def editor_command(folder: Path) -> list[str]:
     """The command line that opens a ramp's plain XML sources in netedit."""
-    return [sumolib.checkBinary("netedit"), "--netccfg-file", str(config(folder))]
+    return [sumolib.checkBinary("netedit"), "--netccfg-file", str(config(folder).resolve())]
 
 
 def open_editor(folder: Path, say: Callable[[str], object]) -> None:
@@ -33,7 +33,7 @@ def open_editor(folder: Path, say: Callable[[str], object]) -> None:
     say(f"Save with File > Save Plain XML (Ctrl+L) over {name}.edg.xml; where a road's length changes, change")
     say("its attribute 'length' and ramp.toml, too. Then close the editor and run:")
     say(f"merge-cosim ramp build {shlex.quote(str(folder))}")
-    status = subprocess.run(command, check=False).returncode
+    status = subprocess.run(command, cwd=folder, check=False).returncode  # its dialogues begin in the ramp's folder
     # netedit writes a configuration of the same name, with absolute paths and without our options.
     settings.write_bytes(kept)
     if status:

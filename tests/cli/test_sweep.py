@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +11,8 @@ import time
 import pyarrow.parquet as pq
 import pytest
 from command import merge_cosim, small_scenario, summary
+
+from merge_cosim.files import shipped
 
 CONTRACT = [
     "scenario",
@@ -156,6 +159,15 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path):
     assert (tmp_path / "out/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
 
 
+SLIPS = (
+    ("misspelt", "ramp =", "rmap ="),
+    ("backwards", "host_speed = { from = 5", "host_speed = { from = -5"),
+    ("kind", 'kind = "grid"', 'kind = "gird"'),
+    ("model", 'model = "designed"', 'model = "designd"'),
+    ("step", "step = 4", "stp = 4"),
+)
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
@@ -175,13 +187,52 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path):
         (("sweep", "us101-replay", "--source", "ngsim"), "MERGE_COSIM_DATA"),
         (("sweep", "us101-replay", "--data", "nosuch"), "nosuch: no such folder"),
         (("sweep", "misspelt.toml"), "misspelt.toml: unknown key 'rmap'; did you mean 'ramp'"),
+        (("sweep", "us101-replay", "--data", "elsewhere"), "elsewhere: no row of us101 or i80"),
+        (("sweep", "small.toml", "--vary", "acc.headway"), "--vary acc.headway: write NAME=A:B:STEP"),
+        (("sweep", "small.toml", "--out", "small.toml"), "small.toml: is a file"),
+        (("sweep", "small.toml", "--out", "small.toml/out"), "small.toml/out"),
+        (("sweep", "backwards.toml"), "backwards.toml: encounters.host_speed = "),
+        (("sweep", "kind.toml"), "kind.toml: encounters.kind = 'gird': there is no such kind"),
+        (("sweep", "model.toml"), "model.toml: unknown merging car 'designd'; did you mean 'designed'"),
+        (("sweep", "step.toml"), "unknown key 'encounters.host_offset.stp'; did you mean 'step'"),
+        (("sweep", "empty.toml"), "empty.toml: the key 'title' is missing"),
+        (
+            ("sweep", "small.toml", "--set", "ramp=no-edge"),
+            "no-edge/ramp.toml: main: the net designed.net.xml has no edge",
+        ),
+        (("sweep", "small.toml", "--set", "ramp=no-net"), "designed.net.xml: no such net"),
+        (("sweep", "small.toml", "--model", "empty.toml", "--method", "pgm"), "empty.toml: not a merge-cosim model"),
+        (("sweep",), "Missing argument 'SCENARIO...'"),
+        (("sweep", "small.toml", "--jobs", "0"), "--jobs"),
+        (("sweep", "small.toml", "--source", "nosuch"), "'nosuch' is not one of"),
+        (("train", "--data", "elsewhere", "--out", "m.json"), "elsewhere: no row of us101 or i80"),
+        (("train", "--source", "surrogate", "--out", "m.txt"), "m.txt: a model file ends in .json"),
+        (("export", "small.toml", "--case", "d+0_h5_m5", "--out", "small.toml"), "small.toml: cannot be"),
+        (("report", "elsewhere"), "elsewhere/results.parquet: no results here"),
+        (("ngsim", "import", "elsewhere", "--out", "imported"), "elsewhere: cannot be read: Is a directory"),
+        (("ngsim", "import", "empty.toml", "--out", "imported"), "empty.toml: not trajectory data: it is empty"),
+        (("ngsim", "summary", "elsewhere"), "elsewhere: no trajectories of us101 or i80"),
         (("run", "small.toml", "--case", "nosuch", "--method", "acc"), "no case 'nosuch'"),
+        (
+            ("run", "small.toml", "--case", "d+0_h5_m5", "--method", "acc", "--trace", "small.toml/x.csv"),
+            "small.toml: cannot be",
+        ),
         (("run", "small.toml", "--case", "d+0_h5_m5", "--method", "acc", "--trace", "x.txt"), "x.txt"),
     ],
 )
 def test_mistakes_get_one_line_and_status_2(tmp_path, arguments, expected):
     text = small_scenario(tmp_path).read_text()
-    (tmp_path / "misspelt.toml").write_text(text.replace("ramp =", "rmap ="))
+    for name, right, wrong in SLIPS:
+        assert right in text
+        (tmp_path / f"{name}.toml").write_text(text.replace(right, wrong, 1))
+    (tmp_path / "empty.toml").touch()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere/note.csv").write_text("Vehicle_ID,Location\n1,lankershim\n")
+    for name in ("no-edge", "no-net"):
+        shutil.copytree(shipped("sumo_nets") / "designed", tmp_path / name)
+    (tmp_path / "no-net/designed.net.xml").unlink()
+    ramp = tmp_path / "no-edge/ramp.toml"
+    ramp.write_text(ramp.read_text().replace("main_in", "main_on"))
     done = merge_cosim(*arguments, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert expected in done.stderr

@@ -74,6 +74,7 @@ def test_a_case_alone_ends_as_in_its_batch_and_can_be_traced():
     trace = alone.traces[0]
     assert len(trace["time_s"]) == alone.columns["end_cycle"][0]
     assert trace["host_station_m"][0] == np.round(encounters.host_station[5], 6)
+    assert trace["time_s"][:4] == [0.0, 0.1, 0.2, 0.3]
     # one cycle of the trace obeys the law of motion
     assert trace["host_station_m"][1] == pytest.approx(
         trace["host_station_m"][0] + 0.1 * trace["host_speed_m_s"][1], abs=2e-6

@@ -1,0 +1,26 @@
+import pytest
+
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.methods import parse_variation
+from merge_cosim.experiments.scenario import Span
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "step", "values"),
+    [
+        (1, 25, 5, [1, 6, 11, 16, 21]),  # 26 would be beyond the end
+        (0, 1, 0.1, [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1]),
+        (3, 3, 1, [3]),
+        (-5, 5, 5, [-5, 0, 5]),
+    ],
+)
+def test_no_value_lies_beyond_the_end(first, last, step, values):
+    span = Span.model_validate({"from": first, "to": last, "step": step})
+    assert span.values() == pytest.approx(values)
+    assert parse_variation(f"acc.d0={first}:{last}:{step}")[1] == pytest.approx(values)
+
+
+@pytest.mark.parametrize("text", ["acc.d0", "acc.d0=", "acc.d0=1:2", "acc.d0=2:1:1", "acc.d0=1:2:0", "acc.d0=1:inf:1"])
+def test_what_cannot_be_varied_is_refused(text):
+    with pytest.raises(UserError, match=r"--vary acc\.d0"):
+        parse_variation(text)
