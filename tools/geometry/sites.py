@@ -107,6 +107,7 @@ def i80(geometry: Path, gore_local_y: float, merge: float, cars: pd.DataFrame) -
     slant = joined(lane, onward(taper, lane.points[-1]))
     x = frame.locate(slant.points)[0]
     gore, end = (float(np.interp(at, x, slant.stations)) for at in (0.0, merge))
+    reach = frame.locate(slant.at(np.array([gore, end])))[1] + extra / 2
     before, beside, beyond = main_edges(
         frame, names, NODES, main, extra, np.array([-UPSTREAM, 0.0, merge, DOWNSTREAM])
     )
@@ -115,7 +116,7 @@ def i80(geometry: Path, gore_local_y: float, merge: float, cars: pd.DataFrame) -
         frame=frame,
         projection=f"{ZONE_3} {PLANE}",
         origin=_host_axis(frame, half, main),
-        joints={"gore": (0.0, half, half + extra), "lane_end": (merge, half, half + extra)},
+        joints={"gore": (0.0, half, float(reach[0])), "lane_end": (merge, half, float(reach[1]))},
         edges=(
             before,
             beside.with_own_shape(0, slant.part(gore, end).simple(TOLERANCE)),
