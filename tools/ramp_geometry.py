@@ -8,6 +8,7 @@ import argparse
 import re
 from pathlib import Path
 
+import pandas as pd
 from geometry.plain_xml import write_sources
 from geometry.plan import Plan
 from geometry.positions import positions
@@ -19,15 +20,20 @@ from merge_cosim.ramps.definition import FILE_NAME, RampFile, read_ramp_file
 NETS = Path(__file__).parent.parent / "sumo_nets"
 
 
+def fitted(cars: pd.DataFrame) -> pd.Series:
+    """Which rows the alignment is fitted to; the others judge it."""
+    return cars["Vehicle_ID"] % 2 == 0
+
+
 def plan_of(name: str, data: Path, file: RampFile) -> Plan:
     """Draw one ramp."""
     assert file.ngsim is not None
     geometry, gore = data / "geometry", file.ngsim.gore_local_y
     cars = positions(data, name)
-    fitted = cars[cars["Vehicle_ID"] % 2 == 0]
+    cars = cars[fitted(cars)]
     if name == "i80":
-        return i80(geometry, gore, file.lengths["merge"], fitted)
-    return us101(geometry, gore, file.lengths["weave"], fitted)
+        return i80(geometry, gore, file.lengths["merge"], cars)
+    return us101(geometry, gore, file.lengths["weave"], cars)
 
 
 def update(path: Path, plan: Plan) -> None:

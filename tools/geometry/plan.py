@@ -52,6 +52,7 @@ class Plan:
     Attributes:
         name: Name of its folder.
         frame: The road's coordinates.
+        tied: The same by the published rows alone, before cars set the zero of Local_X.
         projection: Projection of the metric state plane, as PROJ has it.
         origin: Point of the metric state plane that is (0, 0) in the net [m].
         joints: x of the nodes where lanes begin or end [m past the gore], and how far these reach to the left and to
@@ -65,6 +66,7 @@ class Plan:
 
     name: str
     frame: Frame
+    tied: Frame
     projection: str
     origin: FloatArray
     joints: dict[str, tuple[float, float, float]]
@@ -96,13 +98,14 @@ def main_edges(
     edges = []
     for number, name in enumerate(names):
         beside = number == 1
-        piece = frame.axis.part(ends[number] + frame.gore, ends[number + 1] + frame.gore)
+        start, end = ends[number] + frame.gore, ends[number + 1] + frame.gore
+        stations = start + frame.axis.part(start, end).stations
         edges.append(
             Edge(
                 name,
                 nodes[number],
                 nodes[number + 1],
-                (piece.beside(extra / 2) if beside else piece).simple(TOLERANCE),
+                Line(frame.axis.place(stations, extra / 2 if beside else 0.0)).simple(TOLERANCE),
                 ((("auxiliary", extra), *lanes) if beside else lanes),
                 round(float(ends[number + 1] - ends[number]), 2),
             )

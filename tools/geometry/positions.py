@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 JUMPY = 1380.0
-"""Local_Y [ft] beyond which lane 8 of US-101 jumps sideways by metres from frame to frame: left out."""
+"""Local_Y [ft] beyond which lane 8 of US-101 is left out: there, positions jump sideways by metres and back."""
 
 
 def positions(data: Path, site: str) -> pd.DataFrame:

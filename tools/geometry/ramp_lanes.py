@@ -86,4 +86,4 @@ def onward(line: Line, point: FloatArray) -> Line:
 
 def joined(first: Line, second: Line) -> Line:
     """One line after the other, rounded where they meet."""
-    return Line(np.vstack([first.points[:-1], second.points[1:]]), TURN).smooth(TURN, 1.0)
+    return Line(np.vstack([first.points, second.points[1:]]), TURN).smooth(TURN, 1.0)

@@ -29,6 +29,13 @@ TIES = {
 }
 """The first two rows of `trajectories-0750am-0805am.txt` (car 2) and of `trajectories-0400-0415.txt` (car 1)."""
 
+DRAWN = {
+    "us101": {1: "centerline1", 2: "centerline2", 3: "centerline3", 4: "centerline4", 5: "centerline5", 6: "auxilliary"},
+    "i80": {1: "centerline1", 2: "centerline2", 3: "centerline3", 4: "centerline4", 5: "centerline5", 6: "centerline6"}
+    | {7: "onramp"},
+}
+"""The drawn centre line of each NGSIM lane."""
+
 UPSTREAM, DOWNSTREAM, EXIT = 500.0, 1500.0, 300.0
 """Reach of the net before and after the gore, and length of the off-ramp [m]."""
 NODES = ("main_start", "gore", "lane_end", "main_end")
@@ -48,7 +55,7 @@ def us101(geometry: Path, gore_local_y: float, weave: float, cars: pd.DataFrame)
     painted = {name: _along(reference, edge) for name, edge in edges.items()}
     main = np.round(strip_widths(reference, [painted[f"boundary{number}"] for number in (1, 10, 9, 8, 7, 11)]), 2)
     axis = middle(reference, [drawn[f"centerline{lane}"] for lane in range(1, 6)], main)
-    frame = Frame.tied(axis, TIES["us101"], gore_local_y)
+    frame = tied = Frame.tied(axis, TIES["us101"], gore_local_y)
     beside = np.array([frame.gore, frame.gore + weave])
     extra = float(np.round(strip_widths(axis.part(*beside), [painted["boundary11"], painted["boundary2"]])[0], 2))
     names, half = ("main_in", "weave", "main_out"), float(main.sum()) / 2
@@ -68,6 +75,7 @@ def us101(geometry: Path, gore_local_y: float, weave: float, cars: pd.DataFrame)
     return Plan(
         name="us101",
         frame=frame,
+        tied=tied,
         projection=f"{ZONE_5} {PLANE}",
         origin=_host_axis(frame, half, main),
         joints={"gore": (0.0, half, half + extra), "lane_end": (weave, half, half + extra)},
@@ -98,7 +106,8 @@ def i80(geometry: Path, gore_local_y: float, merge: float, cars: pd.DataFrame) -
     main = np.round(np.append(strips, strips[-1]), 2)
     axis = middle(reference, [drawn[f"centerline{lane}"] for lane in range(1, 5)], main[:4])
     axis = axis.beside(float(main[4:].sum()) / 2)
-    frame = Frame.tied(axis, TIES["i80"], gore_local_y).centred(cars, lane_centres(main))
+    tied = Frame.tied(axis, TIES["i80"], gore_local_y)
+    frame = tied.centred(cars, lane_centres(main)[:5])
     names, half, extra = ("main_in", "merge", "main_out"), float(main.sum()) / 2, float(main[-1])
 
     lane = drawn["onramp"]
@@ -114,6 +123,7 @@ def i80(geometry: Path, gore_local_y: float, merge: float, cars: pd.DataFrame) -
     return Plan(
         name="i80",
         frame=frame,
+        tied=tied,
         projection=f"{ZONE_3} {PLANE}",
         origin=_host_axis(frame, half, main),
         joints={"gore": (0.0, half, float(reach[0])), "lane_end": (merge, half, float(reach[1]))},
