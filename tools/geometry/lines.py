@@ -100,7 +100,9 @@ class Line:
         """Sampled every `step` metres and averaged over `window` metres; its ends stay where they are."""
         stations = np.linspace(0.0, self.length, round(self.length / step) + 1)
         reach = round(window / step)
-        longer = self.at(np.concatenate([np.arange(-reach, 0) * step, stations, self.length + step * np.arange(1, reach)]))
+        longer = self.at(
+            np.concatenate([np.arange(-reach, 0) * step, stations, self.length + step * np.arange(1, reach)])
+        )
         return Line(uniform_filter1d(longer, 2 * (reach // 2) + 1, axis=0)[reach : reach + len(stations)], self.ends)
 
     def simple(self, tolerance: float) -> Line:

@@ -81,7 +81,12 @@ class Plan:
 
 
 def main_edges(
-    frame: Frame, names: tuple[str, str, str], nodes: tuple[str, ...], widths: FloatArray, extra: float, ends: FloatArray
+    frame: Frame,
+    names: tuple[str, str, str],
+    nodes: tuple[str, ...],
+    widths: FloatArray,
+    extra: float,
+    ends: FloatArray,
 ) -> tuple[Edge, Edge, Edge]:
     """The main road: before the gore, beside the auxiliary lane, beyond it.
 

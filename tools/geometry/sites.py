@@ -30,7 +30,14 @@ TIES = {
 """The first two rows of `trajectories-0750am-0805am.txt` (car 2) and of `trajectories-0400-0415.txt` (car 1)."""
 
 DRAWN = {
-    "us101": {1: "centerline1", 2: "centerline2", 3: "centerline3", 4: "centerline4", 5: "centerline5", 6: "auxilliary"},
+    "us101": {
+        1: "centerline1",
+        2: "centerline2",
+        3: "centerline3",
+        4: "centerline4",
+        5: "centerline5",
+        6: "auxilliary",
+    },
     "i80": {1: "centerline1", 2: "centerline2", 3: "centerline3", 4: "centerline4", 5: "centerline5", 6: "centerline6"}
     | {7: "onramp"},
 }
@@ -65,13 +72,9 @@ def us101(geometry: Path, gore_local_y: float, weave: float, cars: pd.DataFrame)
     lane = drawn["auxilliary"]
     on = fit_correction(frame, lane, cars[cars["Lane_ID"] == 7], 0.0, -1)
     off = fit_correction(frame, lane, cars[cars["Lane_ID"] == 8], weave, 1)
-    ramp = joined(
-        up_to(painted["boundary4"].beside(extra / 2), lane.points[0]), led(frame, lane, 0.0, aside, on)
-    )
+    ramp = joined(up_to(painted["boundary4"].beside(extra / 2), lane.points[0]), led(frame, lane, 0.0, aside, on))
     wide = float(painted["boundary12"].locate(lane.points[-1:])[1][0])
-    leave = joined(
-        led(frame, lane, weave, aside, off), onward(painted["boundary12"].beside(wide), lane.points[-1])
-    )
+    leave = joined(led(frame, lane, weave, aside, off), onward(painted["boundary12"].beside(wide), lane.points[-1]))
     return Plan(
         name="us101",
         frame=frame,
@@ -117,9 +120,7 @@ def i80(geometry: Path, gore_local_y: float, merge: float, cars: pd.DataFrame) -
     x = frame.locate(slant.points)[0]
     gore, end = (float(np.interp(at, x, slant.stations)) for at in (0.0, merge))
     reach = frame.locate(slant.at(np.array([gore, end])))[1] + extra / 2
-    before, beside, beyond = main_edges(
-        frame, names, NODES, main, extra, np.array([-UPSTREAM, 0.0, merge, DOWNSTREAM])
-    )
+    before, beside, beyond = main_edges(frame, names, NODES, main, extra, np.array([-UPSTREAM, 0.0, merge, DOWNSTREAM]))
     return Plan(
         name="i80",
         frame=frame,
