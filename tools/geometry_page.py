@@ -83,7 +83,7 @@ def along_road(plan: Plan, drawn: Line, cars: pd.DataFrame) -> str:
 def ties(name: str, ramp: Ramp, plan: Plan) -> str:
     """What the published rows say of each other and of our lanes."""
     points = np.array([tie.plane for tie in TIES[name]]) * SURVEY_FOOT
-    x, r = plan.tied.locate(points)
+    x, _ = plan.tied.locate(points)
     apart = np.ptp(x - plan.tied.road(*np.array([tie.local for tie in TIES[name]]).T)[0])
     right = lane_centres(ramp, origin_of(ramp))[2].locate(points)[1]
     moved = plan.frame.zero - plan.tied.zero
@@ -175,61 +175,64 @@ def corrections(plan: Plan) -> str:
 HEAD = """\
 # The geometry of US-101 and I-80
 
-Both nets are true to scale and georeferenced: lane counts and widths, the curve of the road, on-ramp, off-ramp, gore,
-auxiliary lane (US-101) and acceleration lane (I-80). Their plain XML in `sumo_nets/` is written by
+Both nets are true to scale and georeferenced: lane counts and widths, the curve of the road, on-ramp, off-ramp,
+gore, auxiliary lane (US-101) and acceleration lane (I-80). Their plain XML in `sumo_nets/` is written by
 
     python tools/ramp_geometry.py --data DIR       # DIR/geometry/ and NGSIM's trajectories; writes and builds both
     python tools/geometry_page.py --data DIR       # this page
 
-and needs no survey file to be built again (`merge-cosim ramp build us101`). `merge-cosim ramp edit us101` opens it in
-netedit; `view.xml` in each folder colours the lanes by what they are for.
+and needs no survey file to be built again (`merge-cosim ramp build us101`). `merge-cosim ramp edit us101` opens it
+in netedit; `view.xml` in each folder colours the lanes by what they are for.
 
 ## Sources
 
-- Lane centre lines and road boundaries: NGSIM.jl (MIT), traced from NGSIM's CAD drawings, in feet of the California state
-  plane, NAD83 (US-101: zone V, EPSG:2229; I-80: zone III, EPSG:2227).
-- Trajectories: the fragments of NGSIM that the data folder holds; of I-80 single cars, which is enough for geometry.
-- One place in both coordinates: the first two rows of NGSIM's own files `trajectories-0750am-0805am.txt` (US-101) and
-  `trajectories-0400-0415.txt` (I-80), as many tutorials print them: Local_X, Local_Y with Global_X, Global_Y.
+- Lane centre lines and road boundaries: NGSIM.jl (MIT), traced from NGSIM's CAD drawings, in feet of the California
+  state plane, NAD83 (US-101: zone V, EPSG:2229; I-80: zone III, EPSG:2227).
+- Trajectories: the fragments of NGSIM that the data folder holds; of I-80 single cars, which is enough for
+  geometry.
+- One place in both coordinates: the first two rows of NGSIM's own files `trajectories-0750am-0805am.txt` (US-101)
+  and `trajectories-0400-0415.txt` (I-80), as many tutorials print them: Local_X, Local_Y with Global_X, Global_Y.
 
 ## How the drawing becomes a net
 
-- **Plane.** Feet are US survey feet (1200/3937 m). The nets are in metres of EPSG:26945 (zone V) and EPSG:26943 (zone
-  III), shifted so that (0, 0) is the host lane's axis at the gore; `<location>` says by how much, so that netedit and
-  sumo-gui can lay a map behind the net.
-- **Main road.** One axis: the mean of the drawn centre lines, less each lane's place across the road, averaged over 30 m,
-  because the tracing wobbles by some 0.15 m. Lane widths are the mean distances of the painted boundaries. Corners that
-  change the shape by less than 2 cm are left out.
-- **Along the road.** x = Local_Y - Local_Y of the gore is arc length along that axis, with the offset that the published
-  rows give. SUMO's edge lengths are set to it, so every station is exact.
+- **Plane.** Feet are US survey feet (1200/3937 m). The nets are in metres of EPSG:26945 (zone V) and EPSG:26943
+  (zone III), shifted so that (0, 0) is the host lane's axis at the gore; `<location>` says by how much, so that
+  netedit and sumo-gui can lay a map behind the net.
+- **Main road.** One axis: the mean of the drawn centre lines, less each lane's place across the road, averaged over
+  30 m, because the tracing wobbles by some 0.15 m. Lane widths are the mean distances of the painted boundaries.
+  Corners that change the shape by less than 2 cm are left out.
+- **Along the road.** x = Local_Y - Local_Y of the gore is arc length along that axis, with the offset that the
+  published rows give. SUMO's edge lengths are set to it, so every station is exact.
 - **Across the road.** Local_X is distance across that axis. Its zero is set by the cars of even number, so that the
-  lanes with a drawn centre line (1 to 6 of US-101, 1 to 5 of I-80) have no common shift, in the mean over lanes of each
-  lane's median.
+  lanes with a drawn centre line (1 to 6 of US-101, 1 to 5 of I-80) have no common shift, in the mean over lanes of
+  each lane's median.
 - **US-101's ramps.** Lanes 7 and 8 have no centre line of their own; the auxiliary lane's runs on into both. It is
-  followed, corrected by a parabola that is fitted to the cars of even number, is zero at the auxiliary lane and fades out
-  over 40 m where no car was seen. Upstream the on-ramp follows the outer edge of its loop, half a lane width inside;
-  downstream the off-ramp follows its left edge.
-- **I-80's acceleration lane** keeps to the right edge of the road and so runs slantwise into lane 6: the two overlap.
-  The sixth lane has no right edge of its own in the drawing; it is as wide as the fifth.
+  followed, corrected by a parabola that is fitted to the cars of even number, is zero at the auxiliary lane and
+  fades out over 40 m where no car was seen. Upstream the on-ramp follows the outer edge of its loop, half a lane
+  width inside; downstream the off-ramp follows its left edge.
+- **I-80's acceleration lane** keeps to the right edge of the road and so runs slantwise into lane 6: the two
+  overlap. The sixth lane has no right edge of its own in the drawing; it is as wide as the fifth.
 - **Beyond the survey** every road goes straight on; `[extensions]` in `ramp.toml` says where.
 """
 
 TAIL = """\
 ## Weaknesses
 
-- The alignment along the road rests on two published rows at the upstream end; an error in NGSIM's scale would show at
-  the other end. Sideways, positions wander by up to a metre along the road together in all lanes, which is NGSIM's
-  cameras, not the road: that, and how people drive, is most of the residual.
-- **Lane 6 of US-101**: merging cars keep to the left of it. They are part of the mean that sets Local_X, so lanes 1 to 5
-  are left with a small shift the other way.
-- Around Local_Y 1,390 to 1,410 ft of US-101 the positions of all lanes jump sideways and back by metres: the seam between
-  two cameras, by the look of it.
-- **Lane 8 of US-101**: few cars over 20 m of road; beyond Local_Y 1,380 ft, at that seam, its positions are left out.
-- **Lane 6 of I-80**: on-ramp cars count for it from Local_Y 667 ft on, wherever they are across the road; they make its
-  large distances.
-- **Lane 7 of I-80**: the source begins each car where it comes within 81.6 ft of the road's left edge, so the right half
-  of the on-ramp is seen too seldom.
-- The road behind I-80's survey keeps six lanes; the real one loses its sixth to the next off-ramp, 505 m past the gore.
+- The alignment along the road rests on two published rows at the upstream end; an error in NGSIM's scale would show
+  at the other end. Sideways, positions wander by up to a metre along the road together in all lanes, which is
+  NGSIM's cameras, not the road: that, and how people drive, is most of the residual.
+- **Lane 6 of US-101**: merging cars keep to the left of it. They are part of the mean that sets Local_X, so lanes 1
+  to 5 are left with a small shift the other way.
+- Around Local_Y 1,390 to 1,410 ft of US-101 the positions of all lanes jump sideways and back by metres: the seam
+  between two cameras, by the look of it.
+- **Lane 8 of US-101**: few cars over 20 m of road; beyond Local_Y 1,380 ft, at that seam, its positions are left
+  out.
+- **Lane 6 of I-80**: on-ramp cars count for it from Local_Y 667 ft on, wherever they are across the road; they make
+  its large distances.
+- **Lane 7 of I-80**: the source begins each car where it comes within 81.6 ft of the road's left edge, so the right
+  half of the on-ramp is seen too seldom.
+- The road behind I-80's survey keeps six lanes; the real one loses its sixth to the next off-ramp, 505 m past the
+  gore.
 - The speed limit is the same on the loop of US-101's on-ramp as on the freeway: nobody could drive it so fast.
 - Heights are left out.
 """

@@ -102,7 +102,7 @@ def test_the_gore_lies_where_the_earth_has_it(
     assert latitude[0] < float(node.get("y")) < latitude[1]
 
 
-@pytest.mark.parametrize("name", ("designed", *SITES))
+@pytest.mark.parametrize("name", ["designed", *SITES])
 def test_every_lane_says_what_it_is_for(name: str) -> None:
     ramp = Ramp.load(name)
     roles = {lane.getID(): lane.getParam("role") for edge in read_net(ramp.net).getEdges() for lane in edge.getLanes()}

@@ -61,7 +61,7 @@ class Frame:
         return replace(self, zero=self.zero - float(np.mean(off)))
 
     def road(self, local_x: FloatArray, local_y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """x and r [m] of Local_X and Local_Y [ft]."""
+        """Road coordinates x, r [m] of Local_X and Local_Y [ft]."""
         return local_y * FOOT - self.gore_local_y, local_x * FOOT + self.zero
 
     def plane(self, local_x: FloatArray, local_y: FloatArray) -> FloatArray:
@@ -74,6 +74,6 @@ class Frame:
         return self.axis.place(np.asarray(x, dtype=float) + self.gore, r)
 
     def locate(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """x and r [m] of points in the metric state plane."""
+        """Road coordinates x, r [m] of points in the metric state plane."""
         station, right = self.axis.locate(points)
         return station - self.gore, right

@@ -39,9 +39,8 @@ def _nodes(plan: Plan) -> str:
         along = np.array([x - JOINT, x - JOINT, x + JOINT, x + JOINT])
         shape = _points(plan.local(plan.frame.place(along, across)))
         (place,) = plan.local(plan.frame.place(np.array([x]), right - left))
-        rows.append(
-            f'    <node id="{name}" x="{place[0]:.2f}" y="{place[1]:.2f}" type="unregulated" radius="1" shape="{shape}"/>'
-        )
+        where = f'x="{place[0]:.2f}" y="{place[1]:.2f}"'
+        rows.append(f'    <node id="{name}" {where} type="unregulated" radius="1" shape="{shape}"/>')
     for edge in plan.edges:
         for name, end in ((edge.start, 0), (edge.end, -1)):
             if name not in plan.joints:
@@ -53,7 +52,7 @@ def _nodes(plan: Plan) -> str:
 def _edges(plan: Plan, speed_limit: float) -> str:
     rows = [
         f"{MADE}Each shape is the middle of its edge (spreadType center);",
-        "         length is what SUMO drives: metres along the road, node to node. The parameter 'role' colours a lane. -->",
+        "         length is what SUMO drives, node to node along the road. 'role' is for colours. -->",
     ]
     for edge in plan.edges:
         rows += _edge(plan, edge, speed_limit)
