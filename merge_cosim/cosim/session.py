@@ -211,7 +211,6 @@ class TraciSession(_ApiSession):
 
     def follow(self, car: str) -> None:
         """Let the view of sumo-gui follow a car."""
-        self._api.gui.setSchema(_VIEW, "real world")
         self._api.gui.trackVehicle(_VIEW, car)
         self._api.gui.setZoom(_VIEW, _ZOOM)
 

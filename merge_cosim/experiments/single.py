@@ -19,6 +19,7 @@ from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.routes import write_encounter
 from merge_cosim.ramps.tiles import tile_id
+from merge_cosim.ramps.view import view_options
 from merge_cosim.registry import did_you_mean
 
 
@@ -59,7 +60,8 @@ def trace_case(batch: Batch, gui_delay: int | None = None) -> tuple[dict[str, An
     if gui_delay is None:
         plant = SumoPlant(ramp, 1, batch.seed)
     else:
-        plant = SumoPlant(ramp, 1, batch.seed, _open_window, ("--delay", str(gui_delay)))
+        shown = (*view_options(ramp.net.parent), "--delay", str(gui_delay))
+        plant = SumoPlant(ramp, 1, batch.seed, _open_window, shown)
     try:
         if isinstance(plant.session, TraciSession):
             plant.session.follow(tile_id(0, "host"))

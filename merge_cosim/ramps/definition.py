@@ -25,11 +25,13 @@ class Extensions(_Table):
         main_before: The main road upstream of this place is added.
         main_after: The main road downstream of this place is added.
         ramp_before: The on-ramp upstream of this place is added.
+        exit_after: The off-ramp downstream of this place is added.
     """
 
     main_before: float | None = None
     main_after: float | None = None
     ramp_before: float | None = None
+    exit_after: float | None = None
 
 
 class NgsimMapping(_Table):

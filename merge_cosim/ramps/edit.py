@@ -4,6 +4,7 @@ import os
 import shlex
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import sumolib
 
 from merge_cosim.errors import UserError
 from merge_cosim.ramps.build import config
+from merge_cosim.ramps.view import netedit_view
 
 
 def editor_command(folder: Path) -> list[str]:
@@ -33,7 +35,9 @@ def open_editor(folder: Path, say: Callable[[str], object]) -> None:
     say(f"Save with File > Save Plain XML (Ctrl+L) over {name}.edg.xml; where a road's length changes, change")
     say("its attribute 'length' and ramp.toml, too. Then close the editor and run:")
     say(f"merge-cosim ramp build {shlex.quote(str(folder))}")
-    status = subprocess.run(command, cwd=folder, check=False).returncode  # its dialogues begin in the ramp's folder
+    with tempfile.TemporaryDirectory() as scratch:
+        command += netedit_view(folder, Path(scratch))
+        status = subprocess.run(command, cwd=folder, check=False).returncode  # its dialogues begin in the ramp's folder
     # netedit writes a configuration of the same name, with absolute paths and without our options.
     settings.write_bytes(kept)
     if status:

@@ -9,6 +9,7 @@ from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
 from merge_cosim.ramps.build import build
 from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
+from merge_cosim.ramps.view import copy_view
 
 PATTERN = "designed"
 """The shipped ramp that new ones are copied from."""
@@ -41,6 +42,7 @@ def new_ramp(folder: Path, upstream: float, downstream: float, speed_limit: floa
             target.write_bytes(_resized(path, stretch, speed_limit))
         elif path.suffixes[-2:] != [".net", ".xml"]:
             target.write_text(path.read_text(encoding="utf-8").replace(PATTERN, name), encoding="utf-8")
+    copy_view(source, folder)
     values = {
         "title": f'"{name}"',
         "net": f'"{name}.net.xml"',

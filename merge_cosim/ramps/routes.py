@@ -8,15 +8,14 @@ from lxml import etree
 from merge_cosim.encounter import Encounters
 from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.view import FILE_NAME as VIEW
+from merge_cosim.ramps.view import copy_view
 from merge_cosim.units import DT
 
 ROLE = "merge-cosim.role"
 """Parameter of a vehicle type: `host` or `merging`."""
 MERGE_POSITION = "merge-cosim.merge-position"
 """Parameter of the merging car's type: where its station 0 lies, in m past the gore."""
-
-ZOOM = 600.0
-"""View of sumo-gui on opening [% of the whole net]: some 300 m around the gore."""
 
 COLORS = {"host": "40,160,60", "merging": "210,50,40"}
 """As in the papers' figures."""
@@ -64,15 +63,10 @@ def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) 
             )
         )
     _write(folder / "encounter.rou.xml", _element("routes", {}, *types, *cars))
-    view = (
-        _element("scheme", {"name": "real world"}),
-        _element("viewport", {"x": "0", "y": "0", "zoom": _number(ZOOM)}),
-        _element("delay", {"value": "100"}),
-    )
-    _write(folder / "view.xml", _element("viewsettings", {}, *view))
+    shown = copy_view(ramp.net.parent, folder)
     options = {
         "input": {"net-file": ramp.net.name, "route-files": "encounter.rou.xml"},
-        "gui_only": {"gui-settings-file": "view.xml"},
+        "gui_only": {"gui-settings-file": VIEW} if shown else {},
         "time": {"begin": "0", "step-length": _number(DT)},
         "processing": {"time-to-teleport": "-1", "collision.action": "warn", "no-internal-links": "true"},
     }

@@ -51,6 +51,7 @@ def ngsim_rows(trajectories: Path, recipe: Recipe, ramp: Ramp, site: Site, recor
     rows = np.flatnonzero(filmed & near[run["vehicle_id"].cat.codes])
 
     run, lane, y = run.iloc[rows], lane[rows], y[rows]
+    centre = _each(run["vehicle_lane"], _centres(ramp).__getitem__)
     frame = np.rint((run["timestep_time"].to_numpy() - recipe.warm_up) / DT).astype(np.int64) + 1
     kind = _each(run["vehicle_type"], lambda name: recipe.drivers[int(name.rpartition("-")[2])])
     table = pd.DataFrame(
@@ -58,7 +59,7 @@ def ngsim_rows(trajectories: Path, recipe: Recipe, ramp: Ramp, site: Site, recor
             "Vehicle_ID": pd.factorize(run["vehicle_id"])[0] + 1,
             "Frame_ID": frame,
             "Global_Time": frame * FRAME_MS + recording * CLOCKS_APART_MS,
-            "Local_X": _feet(_left_edge(ramp) - run["vehicle_y"].to_numpy()),
+            "Local_X": _feet(centre - run["vehicle_posLat"].to_numpy()),
             "Local_Y": _feet(y),
             "v_Length": _feet(np.array([each.length for each in kind])),
             "v_Vel": _feet(run["vehicle_speed"].to_numpy()),
@@ -80,7 +81,14 @@ def _feet(metres: FloatArray) -> FloatArray:
     return np.round(metres / FOOT, DECIMALS)
 
 
-def _left_edge(ramp: Ramp) -> float:
-    """Y of the left edge of the main road [m], which runs along the x axis."""
-    lane = read_net(ramp.net).getEdge(ramp.main[0].edge).getLanes()[-1]
-    return float(lane.getShape()[0][1] + lane.getWidth() / 2)
+def _centres(ramp: Ramp) -> dict[str, float]:
+    """How far each lane's centre lies to the right of the main road's left edge [m]; ramps count as beside the road."""
+    net = read_net(ramp.net)
+    road = sum(lane.getWidth() for lane in net.getEdge(ramp.main[0].edge).getLanes())
+    centres = {}
+    for edge in net.getEdges():
+        right = 0.0 if edge.getID() in ramp.main_route else road
+        for lane in reversed(edge.getLanes()):
+            centres[lane.getID()] = right + lane.getWidth() / 2
+            right += lane.getWidth()
+    return centres

@@ -21,7 +21,7 @@ HOUR = 3600.0
 RUN_OUT = 150.0
 """Cars leave the net this far beyond the recorded road [m], so that its end does not show."""
 
-COLUMNS = ("id", "type", "lane", "pos", "y", "speed", "acceleration")
+COLUMNS = ("id", "type", "lane", "pos", "posLat", "speed", "acceleration")
 """What SUMO writes of each car and cycle, beside the time."""
 
 

@@ -23,7 +23,7 @@ from merge_cosim.traffic.ngsim_format import ngsim_rows
 from merge_cosim.traffic.recipe import RECIPES, Recipe
 from merge_cosim.traffic.sumo_run import simulate
 
-SURROGATE_VERSION = 1
+SURROGATE_VERSION = 2
 """Raised when the same recipe would give other files, so that cached ones are made anew."""
 
 PROCESSES = 2

@@ -13,7 +13,7 @@ from merge_cosim.errors import UserError
 from merge_cosim.ngsim.data import load_trajectories
 from merge_cosim.ngsim.encounters import site_pairs
 from merge_cosim.ngsim.sites import SITES, US101, Site
-from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.ramp import Ramp, read_net
 from merge_cosim.traffic.ngsim_format import ngsim_rows
 from merge_cosim.traffic.recipe import RECIPES
 from merge_cosim.traffic.surrogate import cached_surrogate, export, generate, surrogate_folder
@@ -86,17 +86,20 @@ def test_a_row_in_feet_by_hand(tmp_path: Path) -> None:
         "vehicle_type": ["drivers-0", "drivers-0"],
         "vehicle_lane": ["weave_0", "weave_1"],
         "vehicle_pos": [10.0, 11.5],
-        "vehicle_y": [-3.5, 0.0],
+        "vehicle_posLat": [1.0, 0.25],
         "vehicle_speed": [15.0, 15.0],
         "vehicle_acceleration": [0.0, 3.048],
     }
     pq.write_table(pa.table(run), tmp_path / "run.parquet")
-    rows = ngsim_rows(tmp_path / "run.parquet", SHORT["us101"], Ramp.load("us101"), US101, 1).to_pylist()
+    ramp = Ramp.load("us101")
+    rows = ngsim_rows(tmp_path / "run.parquet", SHORT["us101"], ramp, US101, 1).to_pylist()
     assert [row["Lane_ID"] for row in rows] == [6, 5]
     assert [row["Frame_ID"] for row in rows] == [1, 2]
     assert rows[0]["Global_Time"] == 3_600_100
     assert rows[1]["Local_Y"] == round((186.84 + 11.5) / FOOT, 3)
-    assert rows[1]["Local_X"] == round(4.5 * 3.5 / FOOT, 3)  # the middle of the fifth lane of 3.5 m
+    widths = [lane.getWidth() for lane in reversed(read_net(ramp.net).getEdge("weave").getLanes())]
+    assert rows[0]["Local_X"] == round((sum(widths[:5]) + widths[5] / 2 - 1.0) / FOOT, 3)
+    assert rows[1]["Local_X"] == round((sum(widths[:4]) + widths[4] / 2 - 0.25) / FOOT, 3)
     assert rows[1]["v_Acc"] == 10.0
     assert rows[0]["segment"] == "surrogate_2"
 

@@ -1,0 +1,34 @@
+"""How SUMO's windows show a ramp: the file `view.xml` in its folder colours lanes by what they are for."""
+
+import shutil
+from pathlib import Path
+
+FILE_NAME = "view.xml"
+
+_BY_LANE_PARAMETER = {"sumo-gui": 32, "netedit": 13}
+"""Either program's number (SUMO 1.28) for the colours `by param (numerical, lanewise)`."""
+
+
+def view_options(folder: Path) -> tuple[str, ...]:
+    """Options of sumo-gui that show a ramp in its own colours; none if its folder has no view."""
+    file = folder / FILE_NAME
+    return ("--gui-settings-file", str(file.resolve())) if file.is_file() else ()
+
+
+def copy_view(folder: Path, target: Path) -> bool:
+    """Copy a ramp's view, if it has one, to another folder."""
+    file = folder / FILE_NAME
+    if file.is_file():
+        shutil.copyfile(file, target / FILE_NAME)
+    return file.is_file()
+
+
+def netedit_view(folder: Path, scratch: Path) -> tuple[str, ...]:
+    """The same as `view_options` for netedit, with a copy of the view in `scratch` that has netedit's numbers."""
+    if not copy_view(folder, scratch):
+        return ()
+    copy = scratch / FILE_NAME
+    text = copy.read_text(encoding="utf-8")
+    number = f'laneEdgeMode="{_BY_LANE_PARAMETER["sumo-gui"]}"'
+    copy.write_text(text.replace(number, f'laneEdgeMode="{_BY_LANE_PARAMETER["netedit"]}"'), encoding="utf-8")
+    return view_options(scratch)
