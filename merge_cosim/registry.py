@@ -104,8 +104,8 @@ def meanings(cls: type) -> dict[str, str]:
     for base in reversed(cls.__mro__):
         _, _, attributes = inspect.cleandoc(base.__dict__.get("__doc__") or "").partition("\nAttributes:\n")
         for entry in re.split(r"\n {4}(?=\S)", "\n" + attributes)[1:]:
-            name, _, meaning = entry.partition(":")
-            found[name] = " ".join(meaning.split())
+            names, _, meaning = entry.partition(":")
+            found |= dict.fromkeys(names.split(", "), " ".join(meaning.split()))
     return {name: found.get(name, "") for name in parameters(cls)}
 
 

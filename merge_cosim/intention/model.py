@@ -145,7 +145,7 @@ class IntentionModel:
                 speeds={int(lag): _speed_model(document, lag) for lag in document["transitions"]},
                 arrivals=ArrivalHistogram(np.stack([_dense(document["arrivals"][i.name], TIME_BINS) for i in _BOTH])),
             )
-            if not ((model.pairs > 0).all() and (model.arrivals.sum(axis=(1, 2)) > 0).all()):
+            if not ((model.pairs > 0).all() and (model.arrivals.shares.sum(axis=(1, 2)) > 0).all()):
                 raise ValueError("one intention has no pairs or no arrivals")
             return model
         except (ValueError, KeyError, TypeError, IndexError) as error:
