@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from merge_cosim.control.base import controllers
 from merge_cosim.intention.base import estimators
 from merge_cosim.registry import meanings
 
@@ -40,11 +41,10 @@ def test_a_stale_table_is_seen(tool):
     assert tool.filled(stale, {}) == stale
 
 
-@pytest.mark.parametrize(
-    "name", ["acc", "slot", "slot-time", "ipcb", "pgm", "pgm-g", "fg", "fg-gmm", "dbn-pf", "pcb", "lqr"]
-)
-def test_every_method_has_a_page_that_names_it(name):
-    assert any(f"`{name}`" in page.read_text(encoding="utf-8") for page in PAGES)
+@pytest.mark.parametrize("name", [*estimators.names(), *controllers.names()])
+def test_every_component_has_a_page_that_names_it(name):
+    named = re.compile(rf"(?<![\w-]){name}(?![\w-])")
+    assert any(named.search(page.read_text(encoding="utf-8")) for page in PAGES)
 
 
 @pytest.mark.parametrize("name", estimators.names())
