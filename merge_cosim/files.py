@@ -10,7 +10,7 @@ _PACKAGE = Path(__file__).parent
 
 
 def shipped(folder: str) -> Path:
-    """Return the folder `sumo_nets` or `scenarios`: in an installed wheel in the package, else beside it."""
+    """Return a shipped folder such as `scenarios`: in an installed wheel in the package, else beside it."""
     inside = _PACKAGE / "_shipped" / folder
     return inside if inside.is_dir() else _PACKAGE.parent / folder
 

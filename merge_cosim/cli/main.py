@@ -205,6 +205,29 @@ def report(
 
 
 @app.command()
+def bench(
+    cases: Annotated[int, typer.Option(min=1, help="Cases that our loop runs.")] = 2_000,
+    sample: Annotated[int, typer.Option(min=1, help="Of them, how many each alternative runs.")] = 100,
+    rounds: Annotated[int, typer.Option(min=1, help="How often each is timed; the median counts.")] = 5,
+    largest: Annotated[int, typer.Option(min=1, help="Cases of the largest sweep.")] = 100_000,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
+    page: Annotated[Path | None, typer.Option(help="Write the figures as a page in Markdown, too.")] = None,
+    json: Json = False,
+) -> None:
+    """Time the loop, its alternatives, every estimator, and sweeps by cases and processes."""
+    from merge_cosim.bench import bench as figures
+
+    found = figures.bench(cases, sample, rounds, largest, jobs)
+    command = f"merge-cosim bench --cases {cases} --sample {sample} --rounds {rounds} --largest {largest}"
+    if page is not None:
+        figures.write_page(page, found, command)
+    if json:
+        print_json(found)
+    else:
+        typer.echo(figures.page(found, command))
+
+
+@app.command()
 def methods(plugin: Plugins = None, json: Json = False) -> None:
     """List estimators, controllers and merging cars with their parameters."""
     from merge_cosim.experiments.catalogue import components

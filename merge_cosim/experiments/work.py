@@ -19,8 +19,9 @@ from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
 
-TILES = 96
-"""Encounters side by side in one SUMO; from 64 to 128 the cost per vehicle and step hardly changes."""
+TILES = 128
+"""Encounters side by side in one SUMO. Fewer spread the cost of a cycle's Python over fewer cars; with more than about
+190 SUMO's own step costs more per car, as its cars no longer fit the processor's cache."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""How fast it is: against SUMO's bare steps, against the obvious alternatives, and by cases and processes."""

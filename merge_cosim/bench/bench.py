@@ -1,0 +1,143 @@
+"""The bench: all figures of one machine in one document, and the page that shows them."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from merge_cosim.bench.loops import compare, highway
+from merge_cosim.bench.scaling import scaling
+from merge_cosim.bench.updates import estimator_costs
+from merge_cosim.experiments.plan import versions
+
+HEAD = """# Bench
+
+How fast merge-cosim is on one machine, made by
+
+```
+{command}
+```
+
+on {date}: {machine}. Times are wall times; loops and estimators take turns, and the median of {rounds} rounds is
+shown. Absolute times swing with what else the machine does; ratios of one run hold better.
+"""
+LOOPS = """## One process against SUMO's bare steps, and against the obvious alternatives
+
+{cases} cases of `{scenario}` under `{method}` by our loop, {sample} of them by each alternative, scaled by vehicles
+times steps. The alternatives are in `tools/bench/`: they make the same decisions in scalar code, and the bench fails
+if one of their outcomes differs from ours. `scalar` keeps one libsumo and adds and removes each case's cars, `restart`
+starts SUMO for every case, `traci` talks to one sumo over a socket (the wait for the connection is not counted).
+"""
+UPDATES = """## One update of each estimator
+
+Microseconds per encounter, in a full batch and alone.
+"""
+SCALING = """## Whole sweeps by cases and processes
+
+`designed-random` under `acc`. `run_s` is the time with all processes at work, their start included; `loop_ms_per_case`
+is the time in the loops, summed over processes; `peak_mib` is the largest process.
+"""
+
+
+def bench(
+    cases: int = 2_000, sample: int = 100, rounds: int = 5, largest: int = 100_000, jobs: int | None = None
+) -> dict[str, Any]:
+    """Take all figures.
+
+    Args:
+        cases: Cases that our loop runs.
+        sample: Of them, how many the alternatives run.
+        rounds: How often each is timed.
+        largest: Cases of the largest sweep; those of a tenth and a hundredth are run, too.
+        jobs: Processes of the sweeps on several; one per core by default.
+    """
+    several = jobs or os.cpu_count() or 1
+    sizes = sorted({max(1, largest // 100), max(1, largest // 10), largest})
+    return {
+        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+        "machine": machine(),
+        "versions": versions(),
+        "rounds": rounds,
+        **compare(cases, sample, rounds),
+        "highway_env": highway(),
+        "estimators": estimator_costs(rounds),
+        "scaling": scaling(sizes, sorted({1, several})),
+    }
+
+
+def machine() -> dict[str, Any]:
+    """What the figures were taken on."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "memory_gib": _memory_gib(),
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def page(found: Mapping[str, Any], command: str) -> str:
+    """The figures as a page in Markdown."""
+    where = found["machine"]
+    described = f"{where['processor']}, {where['cores']} cores, {where['memory_gib']} GiB, {where['system']}"
+    versions_used = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
+    loops = [{"loop": "ours", "us per vehicle and step": found["us_per_vehicle_step"], "ours is faster by": ""}]
+    loops += [
+        {
+            "loop": name,
+            "us per vehicle and step": found[f"{name}_us_per_vehicle_step"],
+            "ours is faster by": found[f"speedup_vs_{name}"],
+        }
+        for name in ("scalar", "restart", "traci")
+    ]
+    parts = [
+        HEAD.format(command=command, machine=f"{described}; {versions_used}", **_only(found, "date", "rounds")),
+        LOOPS.format(**_only(found, "cases", "scenario", "method", "sample")),
+        _table(loops),
+        f"Ours: {found['vehicle_steps_per_s']:,} vehicle-steps per second; wall time over the time inside "
+        f"`simulationStep` of the same run: **{found['ratio_to_bare_sumo']}**.\n",
+    ]
+    if found["highway_env"]:
+        theirs = found["highway_env"]
+        parts.append(
+            f"For scale, another simulator with other models: highway-env's `merge-v0` makes {theirs['steps_per_s']:,} "
+            f"simulated steps, {theirs['vehicle_steps_per_s']:,} vehicle-steps, per second.\n"
+        )
+    parts += [UPDATES, _table(found["estimators"]), SCALING, _table(found["scaling"])]
+    return "\n".join(parts)
+
+
+def write_page(file: Path, found: Mapping[str, Any], command: str) -> None:
+    """Write the page."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(page(found, command), encoding="utf-8")
+
+
+def _only(found: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    return {name: found[name] for name in names}
+
+
+def _table(rows: Sequence[Mapping[str, Any]]) -> str:
+    names = list(rows[0])
+    lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    lines += ["| " + " | ".join(str(row[name]) for name in names) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def _processor() -> str:
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.is_file():
+        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _memory_gib() -> float | None:
+    try:
+        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1)
+    except (ValueError, OSError, AttributeError):
+        return None

@@ -1,0 +1,155 @@
+"""Our loop beside the obvious alternatives, on the same cases with the same decisions."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from merge_cosim.control.acc import Acc
+from merge_cosim.control.law import DistanceKeeping
+from merge_cosim.cosim.loop import Effort
+from merge_cosim.encounter import Encounters
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.plan import SweepRequest, plan
+from merge_cosim.experiments.work import Batch, Workplace, simulate_batch
+from merge_cosim.files import shipped
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.units import DT
+
+SCENARIO, METHOD = "designed-2", "acc"
+"""What is run: the laws of this scenario and method are the ones that the alternatives spell out."""
+ALTERNATIVES = {"scalar": "scalar.py", "restart": "restart.py", "traci": "traci_socket.py"}
+"""The alternatives and their scripts in `tools/bench`."""
+HIGHWAY = "highway_merge.py"
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What one run of a loop took.
+
+    Attributes:
+        us_per_vehicle_step: Wall time per vehicle and step [us].
+        failed: Outcome of each case, where the loop has our cases.
+    """
+
+    us_per_vehicle_step: float
+    failed: tuple[bool, ...] = ()
+
+
+def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
+    """Time our loop on `cases` cases and the alternatives on every so manieth of them, in turn, `rounds` times.
+
+    Raises:
+        UserError: An alternative's outcome differs from ours, so the times would not compare.
+    """
+    batch = _batch(cases)
+    chosen = np.linspace(0, len(batch.encounters) - 1, sample).round().astype(np.int64)
+    ramp = Ramp.load(batch.scenario.ramp)
+    efforts: list[Effort] = []
+    timings: dict[str, list[Timing]] = {name: [] for name in ALTERNATIVES}
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "task.json"
+        file.write_text(json.dumps(_task(batch, ramp, batch.encounters.take(chosen))), encoding="utf-8")
+        workplace = Workplace()
+        simulate_batch(batch, workplace.plant(ramp, len(batch.encounters), 0), ramp)  # to warm up
+        for _ in range(rounds):
+            run = simulate_batch(batch, workplace.plant(ramp, len(batch.encounters), 0), ramp)
+            efforts.append(run.effort)
+            ours = tuple((run.columns["kind"][chosen] > 0).tolist())
+            for name, script in ALTERNATIVES.items():
+                timing = _run_script(script, file)
+                if timing.failed != ours:
+                    raise UserError(f"bench: {script} finds other failures than ours; its time does not compare")
+                timings[name].append(timing)
+        workplace.close()
+    own = median(1e6 * effort.wall_s / effort.vehicle_steps for effort in efforts)
+    theirs = {name: median(one.us_per_vehicle_step for one in each) for name, each in timings.items()}
+    return {
+        "scenario": SCENARIO,
+        "method": METHOD,
+        "cases": len(batch.encounters),
+        "sample": sample,
+        "vehicle_steps_per_s": round(1e6 / own),
+        "us_per_vehicle_step": round(own, 3),
+        "ratio_to_bare_sumo": round(median(effort.wall_s / effort.step_s for effort in efforts), 3),
+        **{f"{name}_us_per_vehicle_step": round(time, 3) for name, time in theirs.items()},
+        **{f"speedup_vs_{name}": round(time / own, 2) for name, time in theirs.items()},
+    }
+
+
+def highway() -> dict[str, float] | None:
+    """Simulated steps, and vehicles times steps, per second of highway-env's merge scene; None if not installed."""
+    if importlib.util.find_spec("highway_env") is None:
+        return None
+    found = _json_of(HIGHWAY)
+    return {
+        "steps_per_s": round(found["steps"] / found["wall_s"], 1),
+        "vehicle_steps_per_s": round(found["vehicle_steps"] / found["wall_s"], 1),
+    }
+
+
+def _batch(cases: int) -> Batch:
+    (batch,) = plan(SweepRequest([SCENARIO], [METHOD]))
+    n = len(batch.encounters)
+    rows = np.linspace(0, n - 1, min(cases, n)).round().astype(np.int64)
+    return Batch(batch.scenario, "", batch.method, None, batch.encounters.take(rows))
+
+
+def _task(batch: Batch, ramp: Ramp, encounters: Encounters) -> dict[str, Any]:
+    """What the scripts need to know, with the parameters that our own loop uses."""
+    states = ("host_station", "host_speed", "merging_station", "merging_speed")
+    columns = [getattr(encounters, name).tolist() for name in states]
+    car = batch.scenario.merging_car()
+    assert isinstance(car, DistanceKeeping)
+    rules = batch.scenario.test
+    return {
+        "net": str(ramp.net),
+        "main_route": list(ramp.main_route),
+        "ramp_route": list(ramp.ramp_route),
+        "road_length": -ramp.main[0].start,
+        "length": float(encounters.host_length[0]),
+        "speed_limit": batch.setting(ramp).speed_limit,
+        "horizon": round(rules.horizon / DT),
+        "time_out": round(rules.time_out / DT),
+        "host_law": asdict(Acc()),
+        "merging_law": asdict(car),
+        "cases": [dict(zip(states, case, strict=True)) for case in zip(*columns, strict=True)],
+    }
+
+
+def _run_script(script: str, task: Path) -> Timing:
+    found = _json_of(script, str(task))
+    return Timing(1e6 * found["wall_s"] / found["vehicle_steps"], tuple(found["failed"]))
+
+
+def _json_of(script: str, *arguments: str) -> Any:
+    """Run a script of `tools/bench` in a process of its own, as libsumo holds one simulation per process."""
+    file = shipped("tools/bench") / script
+    if not file.is_file():
+        raise UserError(f"{file}: missing; it comes with the source and with the wheel of merge-cosim")
+    return run_json([sys.executable, str(file), *arguments])
+
+
+def run_json(command: Sequence[str]) -> Any:
+    """Run a command that prints one JSON document.
+
+    Raises:
+        UserError: It fails; the line is its last one.
+    """
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ)
+    if done.returncode:
+        raise UserError(
+            f"bench: {' '.join(command[1:3])} failed: {(done.stderr.strip() or 'no message').splitlines()[-1]}"
+        )
+    return json.loads(done.stdout)

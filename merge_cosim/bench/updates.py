@@ -1,0 +1,63 @@
+"""What an update of each registered estimator costs, alone and in a full batch."""
+
+from __future__ import annotations
+
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from merge_cosim.encounter import Intention
+from merge_cosim.experiments.plan import default_model
+from merge_cosim.experiments.work import TILES
+from merge_cosim.intention.base import Estimator, estimators
+from merge_cosim.intention.model import IntentionModel
+from merge_cosim.observation import Observation, Setting
+from merge_cosim.units import DT
+
+CYCLES = 60
+"""Cycles of each timed run: six seconds of an approach."""
+
+
+def estimator_costs(rounds: int) -> list[dict[str, Any]]:
+    """Time of one update per encounter [us], median over `rounds` rounds in which the estimators take turns."""
+    model = IntentionModel.load(default_model("designed"))
+    names = estimators.names()
+    times: dict[tuple[str, int], list[float]] = {(name, count): [] for name in names for count in (TILES, 1)}
+    for _ in range(rounds):
+        for (name, count), found in times.items():
+            found.append(_update_us(_ready(name, model, count), count))
+    return [
+        {
+            "estimator": name,
+            "full_batch_us": round(median(times[name, TILES]), 3),
+            "alone_us": round(median(times[name, 1]), 2),
+        }
+        for name in names
+    ]
+
+
+def _ready(name: str, model: IntentionModel, count: int) -> Estimator:
+    estimator = estimators[name]()
+    if estimator.needs_model:
+        estimator.use(model)
+    estimator.start(count, Setting())
+    estimator.reset(np.arange(count), np.full(count, int(Intention.YIELD)))
+    return estimator
+
+
+def _update_us(estimator: Estimator, count: int) -> float:
+    """Both cars approach with speeds that change a little from cycle to cycle."""
+    rng = np.random.default_rng(0)
+    speeds = rng.uniform(8.0, 20.0, (2, count)) + np.cumsum(rng.normal(0.0, 0.05, (CYCLES, 2, count)), axis=0)
+    stations = -120.0 + np.cumsum(speeds * DT, axis=0)
+    length = np.full(count, 5.0)
+    seen = [
+        Observation(station[0], speed[0], station[1], speed[1], length, length)
+        for station, speed in zip(stations, speeds, strict=True)
+    ]
+    begin = perf_counter()
+    for one in seen:
+        estimator.update(one)
+    return 1e6 * (perf_counter() - begin) / (CYCLES * count)
