@@ -119,8 +119,9 @@ def test_variations_and_settings(tmp_path):
     assert by["merging.ahead=any", "acc"] <= by["merging.ahead=clear", "acc"]
 
 
-def interrupt(scenario, tmp_path, sent):
-    command = [sys.executable, "-m", "merge_cosim.cli.main", "sweep", "designed-2", "--method", "acc"]
+def interrupt(tmp_path, sent, *arguments):
+    """Start a sweep and send it, and its workers, a signal once rows are stored; returns its status and last words."""
+    command = [sys.executable, "-m", "merge_cosim.cli.main", "sweep", *arguments]
     process = subprocess.Popen(
         [*command, "--out", "out", "--jobs", "2"],
         cwd=tmp_path,
@@ -139,22 +140,32 @@ def interrupt(scenario, tmp_path, sent):
 
 
 @pytest.mark.slow
-def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path):
-    status, error = interrupt("designed-2", tmp_path, signal.SIGINT)
-    assert status == 130
-    assert "--resume" in error
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent):
+    arguments = ("designed-random", "--set", "encounters.count=6000", "--method", "acc")
+    status, error = interrupt(tmp_path, sent, *arguments)
+    assert status == (130 if sent == signal.SIGINT else -sent)
+    assert ("--resume" in error) == (sent == signal.SIGINT)
     assert "Traceback" not in error
-    kept = len(list(tmp_path.glob("out/parts/*.parquet")))
-    assert 0 < kept < 7
-    again = merge_cosim("sweep", "designed-2", "--method", "acc", "--out", "out", cwd=tmp_path)
+    kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")}
+    assert 0 < len(kept) < 6
+    again = merge_cosim("sweep", *arguments, "--out", "out", cwd=tmp_path)
     assert again.returncode == 2
     assert "--resume" in again.stderr
-    other = merge_cosim("sweep", "designed-2", "--method", "slot", "--out", "out", "--resume", cwd=tmp_path)
+    other = merge_cosim("sweep", *arguments, "--set", "test.horizon=2", "--out", "out", "--resume", cwd=tmp_path)
     assert other.returncode == 2
-    assert "methods" in other.stderr
-    resumed = merge_cosim("sweep", "designed-2", "--method", "acc", "--out", "out", "--resume", cwd=tmp_path)
+    assert "scenarios, settings changed" in other.stderr
+    plan = tmp_path / "out/parts/plan.json"
+    held = json.loads(plan.read_text())
+    plan.write_text(json.dumps(held | {"versions": held["versions"] | {"libsumo": "1.0"}}))
+    other = merge_cosim("sweep", *arguments, "--out", "out", "--resume", cwd=tmp_path)
+    assert other.returncode == 2
+    assert "versions changed" in other.stderr
+    plan.write_text(json.dumps(held))
+    assert {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")} == kept
+    resumed = merge_cosim("sweep", *arguments, "--out", "out", "--resume", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
-    unbroken = merge_cosim("sweep", "designed-2", "--method", "acc", "--out", "whole", cwd=tmp_path)
+    unbroken = merge_cosim("sweep", *arguments, "--out", "whole", cwd=tmp_path)
     assert unbroken.returncode == 0
     assert (tmp_path / "out/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
 

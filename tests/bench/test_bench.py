@@ -1,0 +1,61 @@
+"""The bench: the alternatives decide as ours does, and all figures stand on the page."""
+
+import json
+
+import pytest
+from command import merge_cosim
+
+from merge_cosim.bench import loops
+from merge_cosim.bench.updates import estimator_costs
+from merge_cosim.errors import UserError
+from merge_cosim.intention.base import estimators
+
+
+@pytest.mark.slow
+def test_every_figure_is_there_and_on_the_page(tmp_path):
+    arguments = ("--cases", 400, "--sample", 60, "--rounds", 1, "--largest", 300, "--jobs", 2, "--page", "bench.md")
+    done = merge_cosim("bench", *arguments, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr  # it fails if an alternative's outcomes are not ours
+    found = json.loads(done.stdout)
+    for name in ("ratio_to_bare_sumo", "speedup_vs_scalar", "speedup_vs_restart", "speedup_vs_traci"):
+        assert found[name] > 1
+    assert found["vehicle_steps_per_s"] > 1000
+    assert {row["estimator"] for row in found["estimators"]} == set(estimators.names())
+    assert [(row["cases"], row["processes"]) for row in found["scaling"]] == [
+        (cases, jobs) for cases in (3, 30, 300) for jobs in (1, 2)
+    ]
+    assert all(row["peak_mib"] > 50 for row in found["scaling"])
+    page = (tmp_path / "bench.md").read_text()
+    for shown in (found["machine"]["processor"], str(found["speedup_vs_traci"]), "| pgm |", "--sample 60"):
+        assert shown in page
+
+
+@pytest.mark.slow
+def test_outcomes_are_compared_case_by_case(monkeypatch):
+    real = loops._run_script
+
+    def one_wrong(script, task):
+        timing = real(script, task)
+        return loops.Timing(timing.us_per_vehicle_step, (not timing.failed[0], *timing.failed[1:]))
+
+    monkeypatch.setattr(loops, "_run_script", one_wrong)
+    with pytest.raises(UserError, match=r"scalar\.py finds other failures than ours"):
+        loops.compare(200, 20, 1)
+
+
+def test_the_sample_holds_failures(tmp_path):
+    batch = loops._batch(400)
+    from merge_cosim.experiments.work import Workplace, run_batch
+
+    workplace = Workplace()
+    try:
+        rows, _ = run_batch(batch, workplace)
+    finally:
+        workplace.close()
+    assert 0 < sum(rows["failed"].to_pylist()) < len(rows)
+
+
+def test_costs_of_all_estimators_are_measured():
+    costs = estimator_costs(rounds=1)
+    assert {row["estimator"] for row in costs} == set(estimators.names())
+    assert all(row["full_batch_us"] > 0 for row in costs)
