@@ -14,6 +14,7 @@ from merge_cosim.experiments.work import TILES
 from merge_cosim.intention.base import Estimator, estimators
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Observation, Setting
+from merge_cosim.streams import stream_keys
 from merge_cosim.units import DT
 
 CYCLES = 60
@@ -43,7 +44,8 @@ def _ready(name: str, model: IntentionModel, count: int) -> Estimator:
     if estimator.needs_model:
         estimator.use(model)
     estimator.start(count, Setting())
-    estimator.reset(np.arange(count), np.full(count, int(Intention.YIELD)))
+    keys = stream_keys(np.arange(count).astype(str), seed=0)
+    estimator.reset(np.arange(count), np.full(count, int(Intention.YIELD)), keys)
     return estimator
 
 

@@ -41,7 +41,8 @@ class FollowingLaw(ABC):
 
     def clip(self, acceleration: FloatArray) -> FloatArray:
         """Bound the acceleration to what the car can do."""
-        return np.clip(acceleration, self.min_acceleration, self.max_acceleration)
+        # np.clip does the same at twice the cost
+        return np.minimum(np.maximum(acceleration, self.min_acceleration), self.max_acceleration)
 
 
 @dataclass(kw_only=True)

@@ -19,7 +19,7 @@ from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
 
-TILES = 128
+TILES = 160
 """Encounters side by side in one SUMO. Fewer spread the cost of a cycle's Python over fewer cars; with more than about
 190 SUMO's own step costs more per car, as its cars no longer fit the processor's cache."""
 

@@ -68,7 +68,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path):
     ramp = merge_cosim("ramp", "new", "mine", "--out", "ramps", cwd=tmp_path)
     assert ramp.returncode == 0, ramp.stderr
     arguments = (
-        *("sweep", "designed-random", "--set", "encounters.count=6000", "--set", "ramp=ramps/mine"),
+        *("sweep", "designed-random", "--set", "encounters.count=4000", "--set", "ramp=ramps/mine"),
         *("--method", "pgm", "--method", "shipped", "--plugin", "shipped.py"),
     )
     alone = merge_cosim(*arguments, "--out", "alone", "--jobs", 1, cwd=tmp_path)
@@ -81,7 +81,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path):
             time.sleep(0.02)
         workers[0].send_signal(signal.SIGKILL)
         parts = len(list(tmp_path.glob("there/parts/*.parquet")))
-        assert 0 < parts < 12  # in mid-run, and rows had come back by then
+        assert 0 < parts < 8  # in mid-run, and rows had come back by then
         _, error = sweep.communicate(timeout=240)
         assert sweep.returncode == 0, error
     assert (tmp_path / "there/results.parquet").read_bytes() == (tmp_path / "alone/results.parquet").read_bytes()
