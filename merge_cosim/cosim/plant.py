@@ -71,7 +71,8 @@ class SumoPlant:
     """SUMO drives the cars on disconnected copies of a ramp; they are added once and moved to each next start.
 
     Stations come from SUMO's lane positions, which depend on a car's own start and speeds alone; the odometer would
-    carry the rounding of all earlier encounters in its tile.
+    carry the rounding of all earlier encounters in its tile. Speeds are the way of a step over its time, which is what
+    SUMO reports (a test holds the two together), at half the calls.
     """
 
     def __init__(
@@ -102,8 +103,7 @@ class SumoPlant:
         self._merge_position = np.zeros(2 * count)
         self._length = np.full(2 * count, np.nan)
         self._in_host_lane = np.ones(count, dtype=bool)
-        self.host_station, self.host_speed = np.zeros(count), np.zeros(count)
-        self.merging_station, self.merging_speed = np.zeros(count), np.zeros(count)
+        self._set_state(np.zeros(2 * count), np.zeros(2 * count))
         self.colliding = np.zeros(count, dtype=bool)
 
     def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
@@ -151,15 +151,19 @@ class SumoPlant:
 
     def _read(self) -> None:
         position = np.fromiter(self.session.positions(self._names), np.float64, 2 * self.count)
-        speed = np.fromiter(self.session.speeds(self._names), np.float64, 2 * self.count)
         self._edge += position < self._position  # cars never back up, so a smaller position is the next edge's
         self._position = position
         station = position + self._edge_start[self._edge] - self._merge_position
-        self.host_station, self.merging_station = station[: self.count], station[self.count :]
-        self.host_speed, self.merging_speed = speed[: self.count], speed[self.count :]
+        self._set_state(station, (station - self._station) / DT)
         self.colliding = np.zeros(self.count, dtype=bool)
         for name in self.session.colliding():
             self.colliding[self._row[name] % self.count] = True
+
+    def _set_state(self, station: FloatArray, speed: FloatArray) -> None:
+        """Take over the state of all hosts, then all merging cars; the public arrays are views of it."""
+        self._station = station
+        self.host_station, self.merging_station = station[: self.count], station[self.count :]
+        self.host_speed, self.merging_speed = speed[: self.count], speed[self.count :]
 
     def close(self) -> None:
         """End the simulation."""

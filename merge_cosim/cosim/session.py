@@ -98,9 +98,6 @@ class Session(Protocol):
     def positions(self, cars: Sequence[str]) -> Iterable[float]:
         """Positions [m] of the front bumpers on the cars' present lanes."""
 
-    def speeds(self, cars: Sequence[str]) -> Iterable[float]:
-        """Speeds [m/s]."""
-
     def colliding(self) -> Sequence[str]:
         """Cars in a contact that SUMO reports for the last step."""
 
@@ -109,11 +106,10 @@ class Session(Protocol):
 
 
 class RawCalls(NamedTuple):
-    """The three calls that are made for every car in every step."""
+    """The two calls that are made for every car in every step."""
 
     set_speed: Callable[[str, float], None]
     lane_position: Callable[[str], float]
-    speed: Callable[[str], float]
 
 
 class _ApiSession:
@@ -165,10 +161,6 @@ class _ApiSession:
         """See `Session`."""
         return map(self._raw.lane_position, cars)
 
-    def speeds(self, cars: Sequence[str]) -> Iterable[float]:
-        """See `Session`."""
-        return map(self._raw.speed, cars)
-
     def colliding(self) -> Sequence[str]:
         """See `Session`."""
         found: Sequence[str] = self._api.simulation.getCollidingVehiclesIDList()
@@ -187,8 +179,7 @@ class LibsumoSession(_ApiSession):
         from libsumo import _libsumo as raw  # the raw calls spare a Python frame per car and step
 
         errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
-        calls = RawCalls(raw.vehicle_setSpeed, raw.vehicle_getLanePosition, raw.vehicle_getSpeed)
-        super().__init__(libsumo, calls)
+        super().__init__(libsumo, RawCalls(raw.vehicle_setSpeed, raw.vehicle_getLanePosition))
         _open(lambda: libsumo.start(["sumo", *options.arguments()]), options, errors)
 
 
@@ -202,7 +193,7 @@ class TraciSession(_ApiSession):
         if "libsumo" in str(getattr(traci, "__file__", "")):
             raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
         errors = (traci.TraCIException, traci.FatalTraCIError)
-        super().__init__(traci, RawCalls(traci.vehicle.setSpeed, traci.vehicle.getLanePosition, traci.vehicle.getSpeed))
+        super().__init__(traci, RawCalls(traci.vehicle.setSpeed, traci.vehicle.getLanePosition))
         command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *options.arguments()]
         if gui:
             command += ["--start", "--quit-on-end", "--window-size", "1200,500"]

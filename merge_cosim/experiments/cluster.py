@@ -171,9 +171,11 @@ def run_shipped(batch: Batch, kit: Kit) -> tuple[pa.Table, Effort]:
 
 def _load_shipped(name: str, content: bytes) -> None:
     digest = hashlib.sha256(content).hexdigest()
-    if _plugins_here.setdefault(name, digest) != digest:
+    if name not in _plugins_here:
+        load_plugin(_unpack("plugins", {name: content}, "") / name)
+        _plugins_here[name] = digest
+    elif _plugins_here[name] != digest:
         raise UserError(f"--dask: the workers have loaded another {name} before; restart them")
-    load_plugin(_unpack("plugins", {name: content}, "") / name)
 
 
 def _unpack(kind: str, files: Mapping[str, bytes], name: str) -> Path:

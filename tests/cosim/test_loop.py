@@ -47,6 +47,25 @@ def test_sumo_drives_as_the_closed_form_does(ramp, merge_position):
     np.testing.assert_array_equal(sumo.columns["kind"], closed.columns["kind"])
 
 
+@pytest.mark.parametrize(("ramp", "merge_position"), [("designed", 0.0), ("us101", 41.0)])
+def test_speeds_are_those_that_sumo_reports(ramp, merge_position):
+    import libsumo
+
+    encounters = random_encounters(16, seed=6, merge_position=merge_position)
+    plant = SumoPlant(Ramp.load(ramp), 16)
+    rng = np.random.default_rng(6)
+    try:
+        for _ in range(2):  # the second time the cars come from where the first encounters ended
+            plant.place(np.arange(16), encounters, np.arange(16))
+            for _ in range(120):  # across edges and the lane change
+                plant.advance(rng.uniform(0, 30, 16), rng.uniform(0, 30, 16))
+                for role, speeds in (("host", plant.host_speed), ("merging", plant.merging_speed)):
+                    reported = [libsumo.vehicle.getSpeed(f"t{tile}.{role}") for tile in range(16)]
+                    np.testing.assert_allclose(speeds, reported, atol=1e-9)
+    finally:
+        plant.close()
+
+
 @pytest.mark.parametrize("method", ["slot", "pgm", "ipcb", "dbn-pf"])
 def test_tile_count_does_not_matter(method):
     encounters = random_encounters(150, seed=2)
