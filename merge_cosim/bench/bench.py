@@ -22,8 +22,10 @@ How fast merge-cosim is on one machine, made by
 {command}
 ```
 
-on {date}: {machine}. Times are wall times; loops and estimators take turns, and the median of {rounds} rounds is
-shown. Absolute times swing with what else the machine does; ratios of one run hold better.
+on {date}: {machine}.
+
+{load}Times are wall times; loops and estimators take turns, and the median of {rounds} is shown. Absolute times swing
+with what else the machine does; ratios of one run hold better.
 """
 LOOPS = """## One process against SUMO's bare steps, and against the obvious alternatives
 
@@ -76,6 +78,7 @@ def machine() -> dict[str, Any]:
         "cores": os.cpu_count(),
         "memory_gib": _memory_gib(),
         "system": f"{platform.system()} {platform.machine()}",
+        "load_before": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
     }
 
 
@@ -93,8 +96,14 @@ def page(found: Mapping[str, Any], command: str) -> str:
         }
         for name in ("scalar", "restart", "traci")
     ]
+    load = where["load_before"]
     parts = [
-        HEAD.format(command=command, machine=f"{described}; {versions_used}", **_only(found, "date", "rounds")),
+        HEAD.format(
+            command=command,
+            machine=f"{described}; {versions_used}",
+            load="" if load is None else f"Load of the machine before the start: {load} (0: nothing else ran). ",
+            **_only(found, "date", "rounds"),
+        ),
         LOOPS.format(**_only(found, "cases", "scenario", "method", "sample")),
         _table(loops),
         f"Ours: {found['vehicle_steps_per_s']:,} vehicle-steps per second; wall time over the time inside "
