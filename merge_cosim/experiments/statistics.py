@@ -99,8 +99,9 @@ def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
     go = frame[frame["method"] == "always-go"].drop_duplicates(CASE)
     possible = (go["host_first"] == True) & ~go["failed"] & (go["gap_m"].fillna(np.inf) >= D0)  # noqa: E712 - may be missing
     known = frame[CASE].merge(go[CASE].assign(possible=possible.astype("boolean")), how="left", on=CASE)["possible"]
+    known = known.set_axis(frame.index)
     passed_second = (frame["host_first"] == False).to_numpy(dtype=bool)  # noqa: E712 - may be missing
-    return known.set_axis(frame.index) & passed_second
+    return (known & passed_second).where(known.notna())
 
 
 def _wilson(failures: int, n: int) -> tuple[float, float]:

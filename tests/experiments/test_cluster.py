@@ -56,9 +56,8 @@ def cluster(folder, workers=2, threads=1):
         options = ("--nthreads", str(threads), "--no-nanny", "--no-dashboard")
         yield address, [start("dask_worker", address, *options)[0] for _ in range(workers)]
     finally:
-        for process in reversed(started):
-            process.terminate()
         for process in started:
+            process.kill()
             process.wait(20)
 
 
