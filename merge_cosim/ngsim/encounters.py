@@ -61,7 +61,7 @@ def site_pairs(
         UserError: A file is damaged.
     """
     rules = rules or PairRules()
-    choices = (site.name, source, repr(rules), str(episodes_from))
+    choices = (site.name, source, repr(rules), str(episodes_from), str(COMPLETE_CARS))
     key = "|".join([*_identity(data), *choices, *_versions()])
     cached = cache_folder("encounters") / f"{site.name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.parquet"
     if cached.is_file():

@@ -72,6 +72,8 @@ def test_where_data_are_looked_for(tmp_path, monkeypatch):
     monkeypatch.delenv("MERGE_COSIM_DATA", raising=False)
     assert find_data(None) is None
     (tmp_path / "data").mkdir()
+    assert find_data(None) is None  # an empty folder holds no data
+    (tmp_path / "data" / "trajectories.csv").touch()
     assert find_data(None).resolve() == tmp_path / "data"
     monkeypatch.setenv("MERGE_COSIM_DATA", str(tmp_path))
     assert find_data(None) == tmp_path
