@@ -119,7 +119,7 @@ class _Loop:
         count, n = plant.count, len(encounters)
         self.plant, self.encounters, self.driver, self.merging_car = plant, encounters, driver, merging_car
         self.setting, self.traced = setting, traced
-        self.scorer = Scorer(count, rules)
+        self.scorer = Scorer(count, rules, encounters.log)
         self.shadow = NumpyPlant(count)
         self.effort = Effort()
         self.traces: dict[int, dict[str, list[float]]] = {case: defaultdict(list) for case in traced}
@@ -133,12 +133,15 @@ class _Loop:
         self.limit = np.full(count, NEVER)
         self.host_length, self.merging_length = np.ones(count), np.ones(count)
         self.next_case = 0
+        self.scored = np.zeros((len(self.scorer.block), n))
         self.columns: dict[str, AnyArray] = {
             "end_cycle": np.zeros(n, dtype=np.int64),
             "end_station": np.zeros(n),
             "end_speed": np.zeros(n),
+            "end_merging_station": np.zeros(n),
+            "end_merging_speed": np.zeros(n),
             "scored_to_end": np.zeros(n, dtype=bool),
-            **{name: np.zeros(n, dtype=column.dtype) for name, column in self.scorer.columns.items()},
+            **dict(zip(self.scorer.columns, self.scored, strict=True)),
         }
 
     def run(self) -> Run:
@@ -163,7 +166,7 @@ class _Loop:
         decided = perf_counter()
         merging_speed = np.where(active, self.merging_car.next_speed(self.age, now), 0.0)
         host_speed = np.where(active, host_speed, 0.0)
-        self.scorer.decided(now, not_yield)
+        self.scorer.decided(self.age, now, log_odds, not_yield)
         if self.traced:
             self._trace(now, log_odds, not_yield, host_speed)
         self.plant.advance(host_speed, merging_speed)
@@ -202,7 +205,7 @@ class _Loop:
         self.merging_car.reset(rows, cases)
         self.driver.estimator.reset(rows, self.encounters.label[cases], self.keys[cases])
         self.driver.controller.reset(rows)
-        self.scorer.reset(rows)
+        self.scorer.reset(rows, cases)
 
     def _finish(self, rows: IntArray, now: Observation) -> None:
         cases = self.case[rows]
@@ -215,11 +218,12 @@ class _Loop:
         ):  # a difference once made stays, so the end shows the largest
             worst = float(np.abs(ours[rows] - closed[rows]).max())
             self.effort.worst_difference_m = max(self.effort.worst_difference_m, worst)
-        for name, column in self.scorer.columns.items():
-            self.columns[name][cases] = column[rows]
+        self.scored[:, cases] = self.scorer.block[:, rows]
         self.columns["end_cycle"][cases] = self.age[rows]
         self.columns["end_station"][cases] = now.host_station[rows]
         self.columns["end_speed"][cases] = now.host_speed[rows]
+        self.columns["end_merging_station"][cases] = now.merging_station[rows]
+        self.columns["end_merging_speed"][cases] = now.merging_speed[rows]
         self.columns["scored_to_end"][cases] = self.scorer.scored_to_end(self.age)[rows]
 
     def _trace(self, now: Observation, log_odds: FloatArray, not_yield: BoolArray, next_speed: FloatArray) -> None:

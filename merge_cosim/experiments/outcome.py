@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pyarrow as pa
 
 from merge_cosim.control.acc import Acc
+from merge_cosim.cosim.decisions import GATES
 from merge_cosim.cosim.loop import Run
 from merge_cosim.cosim.scoring import GOAL, KINDS
 from merge_cosim.encounter import NEVER, Encounters, Intention
 from merge_cosim.observation import Setting
 from merge_cosim.units import AnyArray, BoolArray, FloatArray
 
-SCHEMA_VERSION = "1"
+SCHEMA_VERSION = "2"
 SCHEMA = pa.schema(
     [
         ("scenario", pa.string()),
@@ -38,8 +41,16 @@ SCHEMA = pa.schema(
         ("gap_m", pa.float64()),
         ("min_gap_m", pa.float64()),
         ("min_ttc_s", pa.float64()),
+        ("max_drac", pa.float64()),
+        ("pet_s", pa.float64()),
         ("delay_s", pa.float64()),
         ("hardest_braking", pa.float64()),
+        ("mean_jerk", pa.float64()),
+        ("first_stable_s", pa.float64()),
+        *((f"log_odds_{gate}", pa.float64()) for gate in GATES),
+        *((f"arrival_lead_{gate}", pa.float64()) for gate in GATES),
+        ("human_station_rms_m", pa.float64()),
+        ("human_speed_rms", pa.float64()),
         ("host_reached_s", pa.float64()),
         ("merging_reached_s", pa.float64()),
         ("end_s", pa.float64()),
@@ -64,7 +75,8 @@ def result_rows(run: Run, encounters: Encounters, setting: Setting, free_law: Ac
     c, n, dt = run.columns, len(encounters), setting.dt
     failed = c["kind"] > 0
     labelled = encounters.label >= 0
-    decided = labelled & (c["last_decision"] >= 0)
+    decided = c["last_decision"] >= 0
+    correct = labelled & decided & (c["last_decision"] == encounters.label)
     host_first = _earlier(c["host_reached_s"], c["merging_reached_s"])
     order_known = ~(np.isnan(c["host_reached_s"]) & np.isnan(c["merging_reached_s"]))
     if encounters.log is None:
@@ -84,7 +96,7 @@ def result_rows(run: Run, encounters: Encounters, setting: Setting, free_law: Ac
         "case": encounters.case,
         "car": encounters.car,
         "failed": failed,
-        "failure_kind": np.array(KINDS)[c["kind"]],
+        "failure_kind": np.array(KINDS)[c["kind"].astype(np.int64)],
         "censored": unfinished & ((c["end_cycle"] >= score_until) | (c["scored_from"] >= 0)),
         "extended": c["end_cycle"] > last_logged,
         "smoothed_source": encounters.smoothed_source,
@@ -92,14 +104,21 @@ def result_rows(run: Run, encounters: Encounters, setting: Setting, free_law: Ac
         "host_first": _masked(host_first, order_known),
         "order_swapped": _masked(host_first != (encounters.label == Intention.YIELD), order_known & labelled),
         "label": np.array(["YIELD", "NOT_YIELD", ""])[encounters.label],
-        "correct_at_merge": _masked(c["last_decision"] == encounters.label, decided),
-        "decision_flips": c["decision_flips"].astype(np.int32),
+        "correct_at_merge": _masked(correct, labelled & decided),
+        "decision_flips": pa.array(c["decision_flips"], pa.int32(), mask=~decided),
         "distance_m": _finite(c["distance_m"]),
         "gap_m": _finite(c["gap_m"]),
         "min_gap_m": _finite(c["min_gap_m"]),
         "min_ttc_s": _finite(c["min_ttc_s"]),
+        "max_drac": _masked(c["max_drac"], c["max_drac"] > 0),
+        "pet_s": _finite(post_encroachment(c, encounters, dt)),
         "delay_s": _delay(c, encounters, setting, free_law),
         "hardest_braking": c["hardest_braking"],
+        "mean_jerk": _ratio(c["jerk_sum"] / dt, c["end_cycle"] - 1),
+        "first_stable_s": _masked(c["decided_from"] * dt, correct),
+        **{f"log_odds_{gate}": _known(c[f"log_odds_{gate}"]) for gate in GATES},
+        **{f"arrival_lead_{gate}": _known(c[f"arrival_lead_{gate}"]) for gate in GATES},
+        **_likeness(c, encounters),
         "host_reached_s": _finite(c["host_reached_s"]),
         "merging_reached_s": _finite(c["merging_reached_s"]),
         "end_s": c["end_cycle"] * dt,
@@ -144,8 +163,46 @@ def _earlier(first: FloatArray, second: FloatArray) -> BoolArray:
     return np.nan_to_num(first, nan=np.inf) < np.nan_to_num(second, nan=np.inf)
 
 
-def _masked(values: BoolArray, known: BoolArray) -> pa.Array:
-    return pa.array(values, pa.bool_(), mask=~known)
+def post_encroachment(c: Mapping[str, AnyArray], encounters: Encounters, dt: float) -> FloatArray:
+    """Post-encroachment time [s]: from the first car's rear clearing the merging point to the second's front there.
+
+    Where the run ended before the rear was through, it goes on at the first car's last speed, which makes the time
+    negative. NaN where a front never arrives, or the first car was through from the start, or stands on the point.
+    """
+    host = np.where(encounters.host_station >= 0, -np.inf, c["host_reached_s"])
+    merging = np.where(encounters.merging_station >= 0, -np.inf, c["merging_reached_s"])
+    host_second = host >= merging
+    cleared = np.where(host_second, c["merging_cleared_s"], c["host_cleared_s"])
+    rear = np.where(
+        host_second,
+        c["end_merging_station"] - encounters.merging_length,
+        c["end_station"] - encounters.host_length,
+    )
+    speed = np.where(host_second, c["end_merging_speed"], c["end_speed"])
+    left = np.divide(-rear, speed, out=np.full(len(rear), np.nan), where=(speed > 0) & (rear < 0))
+    cleared = np.where(np.isnan(cleared), c["end_cycle"] * dt + left, cleared)
+    return np.where(np.isnan(host + merging), np.nan, np.maximum(host, merging) - cleared)
+
+
+def _likeness(c: Mapping[str, AnyArray], encounters: Encounters) -> dict[str, pa.Array]:
+    """Root mean square differences to the logged host over the cycles that both drive."""
+    last = np.zeros(len(encounters)) if encounters.log is None else encounters.log.host_station.lengths - 1
+    joint = np.minimum(c["end_cycle"], last)
+    squares = {"human_station_rms_m": c["station_square_sum"], "human_speed_rms": c["speed_square_sum"]}
+    return {name: _ratio(total, joint, root=True) for name, total in squares.items()}
+
+
+def _ratio(total: FloatArray, count: AnyArray, root: bool = False) -> pa.Array:
+    mean = total / np.maximum(count, 1)
+    return _masked(np.sqrt(mean) if root else mean, count > 0)
+
+
+def _masked(values: AnyArray, known: BoolArray) -> pa.Array:
+    return pa.array(values, mask=~known)
+
+
+def _known(values: FloatArray) -> pa.Array:
+    return pa.array(values, pa.float64(), mask=np.isnan(values))
 
 
 def _finite(values: FloatArray) -> pa.Array:

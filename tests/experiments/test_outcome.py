@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from merge_cosim.control.acc import Acc
+from merge_cosim.cosim.decisions import GATES
 from merge_cosim.cosim.loop import Effort, Run
 from merge_cosim.encounter import Encounters, Ragged, ReplayLog
 from merge_cosim.experiments.outcome import free_time, result_rows
@@ -45,12 +46,22 @@ def row(case=None, **changed):
         "min_gap_m": np.inf,
         "min_ttc_s": np.inf,
         "hardest_braking": 1.0,
+        "max_drac": 0.0,
+        "jerk_sum": 9.8,
         "decision_flips": 2,
         "last_decision": 1,
+        "decided_from": 7,
+        **{f"{kind}_{gate}": np.nan for kind in ("log_odds", "arrival_lead") for gate in GATES},
+        "host_cleared_s": np.nan,
+        "merging_cleared_s": 1.5,
+        "station_square_sum": 49.0 * 4.0,
+        "speed_square_sum": 49.0 * 0.25,
         "sumo_collision": 0,
         "end_cycle": 50,
         "end_station": 20.0,
         "end_speed": 29.0,
+        "end_merging_station": 40.0,
+        "end_merging_speed": 10.0,
         "scored_to_end": True,
     } | changed
     run = Run({name: np.array([value]) for name, value in columns.items()}, Effort())
@@ -117,3 +128,35 @@ def test_a_run_past_the_logs_end_is_extended():
 def test_missing_is_missing():
     nothing = row(distance_m=np.nan, gap_m=np.nan)
     assert [nothing[name] for name in ("distance_m", "gap_m", "min_gap_m", "min_ttc_s")] == [None] * 4
+
+
+def test_post_encroachment_time_runs_from_the_first_rear_to_the_second_front():
+    assert row()["pet_s"] == pytest.approx(2.0 - 1.5)
+    behind = row(host_reached_s=0.5, host_cleared_s=0.9)  # the merging car second, at 1.0 s
+    assert behind["pet_s"] == pytest.approx(1.0 - 0.9)
+    # the run ends at 5.0 s with the merging car's rear 2 m before the point, at 10 m/s
+    overlap = row(merging_cleared_s=np.nan, end_merging_station=3.0)
+    assert overlap["pet_s"] == pytest.approx(2.0 - 5.2)
+    standing = row(merging_cleared_s=np.nan, end_merging_station=3.0, end_merging_speed=0.0)
+    assert standing["pet_s"] is None
+    assert row(host_reached_s=np.nan)["pet_s"] is None
+
+
+def test_jerk_and_likeness_are_means_over_the_cycles():
+    measured = row()
+    assert measured["mean_jerk"] == pytest.approx(9.8 / 0.1 / 49)
+    assert measured["human_station_rms_m"] == pytest.approx(2.0)  # the log has 49 cycles after its first
+    assert measured["human_speed_rms"] == pytest.approx(0.5)
+    assert row(end_cycle=1)["mean_jerk"] is None
+
+
+def test_a_stable_decision_counts_only_if_it_is_right():
+    assert row()["first_stable_s"] == pytest.approx(0.7)
+    assert row(last_decision=0)["first_stable_s"] is None
+    assert row(case=encounters(label=-1))["first_stable_s"] is None
+    assert row(last_decision=-1)["decision_flips"] is None
+
+
+def test_a_rules_certainty_stays_infinite():
+    assert row(log_odds_40=-np.inf)["log_odds_40"] == -np.inf
+    assert row()["log_odds_40"] is None

@@ -7,7 +7,7 @@ import pytest
 from merge_cosim.experiments.outcome import SCHEMA
 from merge_cosim.experiments.statistics import oracle_best, summarise
 
-BASE = {
+BASE = dict.fromkeys(SCHEMA.names) | {
     "scenario": "s",
     "variation": "",
     "site": "us101",
