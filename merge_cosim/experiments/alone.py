@@ -44,7 +44,7 @@ def run_alone(batches: Sequence[Batch], results: ResultFolder) -> tuple[dict[str
         names = {"scenario": scenario, "case": str(few.encounters.case[0]), "method": batch.method.name}
         records.append(pd.DataFrame(run.traces[0]).assign(**names))
     workplace.close()
-    times = {name: 1e6 * effort.method_s / effort.encounter_cycles for name, effort in efforts.items()}
+    times = {name: 1e6 * e.method_s / e.encounter_cycles for name, e in efforts.items() if e.encounter_cycles}
     return times, pa.Table.from_pandas(pd.concat(records), preserve_index=False)
 
 

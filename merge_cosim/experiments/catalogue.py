@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from merge_cosim.control.base import controllers
-from merge_cosim.experiments.methods import CONSTANT, ORACLE_BEST
+from merge_cosim.experiments.methods import CONSTANT, HUMAN, ORACLE_BEST
 from merge_cosim.intention.base import estimators
 from merge_cosim.registry import Registry, load_plugin, parameters
 from merge_cosim.traffic.base import merging_cars
@@ -26,5 +26,8 @@ def components(plugins: Sequence[Path] = ()) -> list[dict[str, Any]]:
         for registry in registries
         for name in registry.names()
     ]
-    derived = f"The better of {' and '.join(CONSTANT)} on each case (made by the statistics)."
-    return [*rows, {"role": "derived", "name": ORACLE_BEST, "about": derived, "parameters": {}}]
+    derived = {
+        ORACLE_BEST: f"The better of {' and '.join(CONSTANT)} on each case (made by the statistics).",
+        HUMAN: "The logged host itself, on replay (made from the log).",
+    }
+    return [*rows, *({"role": "derived", "name": n, "about": about, "parameters": {}} for n, about in derived.items())]

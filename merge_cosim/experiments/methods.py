@@ -18,6 +18,8 @@ from merge_cosim.registry import did_you_mean, parameters
 
 ORACLE_BEST = "oracle-best"
 """The better of always-go and always-yield on each case: a row made by the statistics, no estimator."""
+HUMAN = "human"
+"""The logged host itself, on replay: rows made from the log, no estimator."""
 CONSTANT = ("always-go", "always-yield")
 """The methods that `oracle-best` chooses from."""
 
@@ -44,6 +46,8 @@ class Method:
         Raises:
             UserError: One of them is unknown, or a parameter is wrong.
         """
+        if name == HUMAN:
+            return cls(HUMAN, HUMAN, "", tuple(sorted((settings or {}).items())))
         estimator, _, controller = name.partition("+")
         chosen = controller or estimators[estimator].default_controller
         method = cls(name, estimator, chosen, tuple(sorted((settings or {}).items())))
@@ -51,14 +55,19 @@ class Method:
         return method
 
     @property
+    def is_human(self) -> bool:
+        """It is the logged host, who needs no method."""
+        return self.name == HUMAN
+
+    @property
     def needs_model(self) -> bool:
         """Its estimator rests on a trained model."""
-        return estimators[self.estimator].needs_model
+        return not self.is_human and estimators[self.estimator].needs_model
 
     @property
     def needs_label(self) -> bool:
         """Its estimator looks at the label."""
-        return estimators[self.estimator].needs_label
+        return not self.is_human and estimators[self.estimator].needs_label
 
     def driver(self, model: IntentionModel | None) -> Driver:
         """Make the two parts; `model` goes to an estimator that needs one."""
@@ -82,13 +91,17 @@ class Method:
 
 def default_methods() -> list[str]:
     """Every registered estimator, with the papers' rivals and the references."""
-    return [*estimators.names(), ORACLE_BEST]
+    return [*estimators.names(), ORACLE_BEST, HUMAN]
 
 
 def methods_for(encounters: Encounters, methods: Iterable[Method]) -> list[Method]:
-    """The methods that can run on these encounters: those that look at labels need labels."""
-    labelled = bool((encounters.label >= 0).all())
-    return [method for method in methods if labelled or not method.needs_label]
+    """The methods that can run on these encounters: who looks at labels needs some, and the human host needs a log."""
+    labelled = bool((encounters.label >= 0).any())
+    return [
+        method
+        for method in methods
+        if (labelled or not method.needs_label) and (encounters.log is not None or not method.is_human)
+    ]
 
 
 def split_settings(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -56,7 +56,8 @@ def run_single(
 def trace_case(batch: Batch, gui_delay: int | None = None) -> tuple[dict[str, Any], pd.DataFrame]:
     """Run a batch of one and return its result row and its record, one row per cycle."""
     ramp = Ramp.load(batch.scenario.ramp)
-
+    if gui_delay is not None and batch.method.is_human:
+        raise UserError("--gui: the method 'human' is the log itself and is not driven in SUMO; leave one of them out")
     if gui_delay is None:
         plant = SumoPlant(ramp, 1, batch.seed)
     else:

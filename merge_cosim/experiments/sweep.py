@@ -100,6 +100,7 @@ def _sum_up(batches: Sequence[Batch], folder: ResultFolder, tally: _Tally) -> No
     cycle_us = {
         name: (1e6 * effort.method_s / effort.encounter_cycles, single_us.get(name))
         for name, effort in tally.by_method.items()
+        if effort.encounter_cycles
     }
     summary = pd.concat([summarise(folder.rows_of(*group), cycle_us) for group in folder.groups()], ignore_index=True)
     summary.to_csv(folder.path / SUMMARY_CSV, index=False)

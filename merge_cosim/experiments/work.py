@@ -12,6 +12,7 @@ from merge_cosim.control.base import controllers
 from merge_cosim.cosim.loop import Effort, Run, simulate
 from merge_cosim.cosim.plant import Plant, SumoPlant
 from merge_cosim.encounter import Encounters
+from merge_cosim.experiments.human import simulate_human
 from merge_cosim.experiments.methods import Method
 from merge_cosim.experiments.outcome import result_rows
 from merge_cosim.experiments.scenario import Scenario
@@ -94,7 +95,10 @@ def run_batch(batch: Batch, workplace: Workplace) -> tuple[pa.Table, Effort]:
 
 
 def simulate_batch(batch: Batch, plant: Plant, ramp: Ramp, traced: Sequence[int] = ()) -> Run:
-    """Simulate a batch on a given plant."""
+    """Simulate a batch on a given plant; the human host needs none."""
+    if batch.method.is_human:
+        car, rules = batch.scenario.merging_car(), batch.scenario.test
+        return simulate_human(batch.encounters, car, rules, batch.setting(ramp), tuple(traced))
     return simulate(
         plant,
         batch.encounters,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from merge_cosim.experiments.methods import ORACLE_BEST
+from merge_cosim.experiments.methods import HUMAN, ORACLE_BEST
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order, is_reference
 from merge_cosim.report.published import published
@@ -148,8 +148,8 @@ def varied_parameters(summary: pd.DataFrame) -> list[tuple[str, str]]:
 
 
 def runs_in_sumo(results: pd.DataFrame) -> pd.DataFrame:
-    """The rows that were simulated, without those that the statistics picked from others."""
-    return results[results["method"] != ORACLE_BEST]
+    """The rows that were simulated, without those picked from others or made from the log."""
+    return results[~results["method"].isin((ORACLE_BEST, HUMAN))]
 
 
 def _of_section(summary: pd.DataFrame, section: Section) -> pd.DataFrame:

@@ -51,6 +51,10 @@ class Replay(MergingCar):
 
     def next_speed(self, age: IntArray, now: Observation) -> FloatArray:
         """The speed to the log's next station."""
+        return self.speed(age)
+
+    def speed(self, age: IntArray) -> FloatArray:
+        """The logged speed [m/s] from cycle `age` to the next, shape (n,); past the log's end the last one."""
         following = np.minimum(self._row_first + age + 1, self._row_last)
         step = (self._station[following] - self._station[following - 1]) / self.setting.dt
         return np.maximum(step, 0.0)

@@ -1,0 +1,77 @@
+"""The row `human`: the logged host itself, scored as the methods are. He is a row made from the log, no estimator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from merge_cosim.control.base import Controller
+from merge_cosim.cosim.loop import Driver, Effort, Run, simulate
+from merge_cosim.cosim.plant import NumpyPlant
+from merge_cosim.cosim.scoring import Rules
+from merge_cosim.encounter import Encounters
+from merge_cosim.intention.base import Estimator
+from merge_cosim.observation import Observation, Setting
+from merge_cosim.traffic.base import MergingCar
+from merge_cosim.traffic.replay import Replay
+from merge_cosim.units import BoolArray, FloatArray, IntArray
+
+
+def simulate_human(
+    encounters: Encounters, merging_car: MergingCar, rules: Rules, setting: Setting, traced: tuple[int, ...] = ()
+) -> Run:
+    """Let the logged hosts meet the logged merging cars, in the closed form, and score them by the same rules.
+
+    A host whose log ends before scoring does goes on at its last speed. Nothing is decided, and no effort is counted,
+    since neither SUMO nor a method is at work.
+
+    Args:
+        encounters: The n cases, with a log.
+        merging_car: How the merging cars drive.
+        rules: When a case is scored.
+        setting: Speed limit and cycle.
+        traced: Indices of the cases to record cycle by cycle.
+    """
+    plant = _LoggedHosts(encounters, setting)
+    run = simulate(plant, encounters, Driver(_Nobody(), _Idle()), merging_car, rules, setting, traced)
+    undecided = run.columns | {"last_decision": np.full(len(encounters), -1.0)}
+    return replace(run, columns=undecided, effort=Effort())
+
+
+class _LoggedHosts(NumpyPlant):
+    """The closed form with hosts that meet their logged stations, whatever they are told."""
+
+    def __init__(self, encounters: Encounters, setting: Setting) -> None:
+        n = len(encounters)
+        super().__init__(n)
+        assert encounters.log is not None
+        as_merging = replace(encounters.log, merging_station=encounters.log.host_station)
+        self._driver = Replay()
+        self._driver.start(replace(encounters, log=as_merging), n, setting)
+        self._age = np.zeros(n, dtype=np.int64)
+
+    def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
+        super().place(tiles, encounters, cases)
+        self._driver.reset(tiles, cases)
+        self._age[tiles] = 0
+
+    def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
+        super().advance(self._driver.speed(self._age), merging_speed)
+        self._age += 1
+
+
+@dataclass(kw_only=True)
+class _Nobody(Estimator):
+    """Believes nothing."""
+
+    def update(self, seen: Observation) -> FloatArray:
+        return np.full(len(seen.host_station), np.nan)
+
+
+@dataclass(kw_only=True)
+class _Idle(Controller):
+    """Commands nothing."""
+
+    def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
+        return np.zeros(len(seen.host_station))
