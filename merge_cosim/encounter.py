@@ -118,7 +118,7 @@ class Encounters:
         host_station, host_speed, host_length: The host's initial state [m, m/s, m].
         merging_station, merging_speed, merging_length: The merging car's initial state.
         merge_position: Where station 0 lies, in metres along the main road past the ramp's gore.
-        label: The order in the log (`Intention`), UNKNOWN where nothing is logged.
+        label: The order in the log, or the scripted intention (`Intention`); UNKNOWN where there is neither.
         smoothed_source: The source's positions were smoothed before they were published.
         length_missing: A car's length was not logged and 5 m stands for it.
         log: The logged trajectories, or None.

@@ -85,7 +85,7 @@ def plan(request: SweepRequest) -> list[Batch]:
             if varied in of_components:
                 methods = [one for one in methods if varied.partition(".")[0] in (one.estimator, one.controller)]
             for scenario in _scenarios(request.scenarios, of_scenario, varied):
-                key = repr((scenario.encounters, scenario.is_replay, scenario.ramp))
+                key = scenario.encounters_key
                 if key not in loaded:
                     loaded[key] = _by_name(load_encounters(scenario, request.data, request.source))
                 label = f"{varied}={value}" if varied else ""

@@ -6,13 +6,14 @@ import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
+    NonNegativeFloat,
     NonNegativeInt,
     PositiveFloat,
     PositiveInt,
@@ -149,6 +150,39 @@ class Pairs(_Strict):
     rules: PairRules = PairRules()
 
 
+class Drawn(_Strict):
+    """Seeded random initial states (Designed Test III); a case's state depends on its number and the seed alone.
+
+    Both cars start within the same spans of way and speed. The merging car's state is uniform over them. The difference
+    of the times to arrival, T_m - T_h, is uniform from -`max_lead` to `max_lead`, and the host's speed is uniform over
+    what then leaves its way within the span; a merging car's state that no host can match is drawn again.
+
+    Attributes:
+        count: Number of cases.
+        seed: Seed of the states.
+        nearest, farthest: Ways to the merging point [m].
+        slowest, fastest: Speeds [m/s].
+        max_lead: Largest difference of the times to arrival [s].
+        length: Length of both cars [m].
+    """
+
+    kind: Literal["drawn"]
+    count: PositiveInt = 5_000
+    seed: int = 0
+    nearest: PositiveFloat = 60.0
+    farthest: PositiveFloat = 150.0
+    slowest: PositiveFloat = 8.0
+    fastest: PositiveFloat = 28.0
+    max_lead: NonNegativeFloat = 2.0
+    length: PositiveFloat = 5.0
+
+    @model_validator(mode="after")
+    def _spans(self) -> Self:
+        if self.nearest >= self.farthest or self.slowest >= self.fastest:
+            raise ValueError("nearest must be below farthest, and slowest below fastest")
+        return self
+
+
 class Routes(_Strict):
     """Cars of an ordinary SUMO configuration, by the roles of their types.
 
@@ -177,7 +211,7 @@ class Scenario(_Strict):
     title: str
     about: str = ""
     ramp: str
-    encounters: Annotated[Grid | Random | Pairs | Routes, Field(discriminator="kind")]
+    encounters: Annotated[Grid | Random | Drawn | Pairs | Routes, Field(discriminator="kind")]
     merging: dict[str, Any]
     test: Rules = Rules()
     speed_limit: PositiveFloat | None = None
@@ -191,6 +225,12 @@ class Scenario(_Strict):
         """
         values = dict(self.merging)
         return merging_cars.build(str(values.pop("model", "")), values, "[merging]")
+
+    @property
+    def encounters_key(self) -> str:
+        """What its encounters depend on: scenarios with the same key share them."""
+        script = self.merging if isinstance(self.encounters, Drawn) else self.is_replay
+        return repr((self.encounters, script, self.ramp))
 
     @property
     def is_replay(self) -> bool:
@@ -265,6 +305,7 @@ _KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules]] =
     ("encounters", "grid"): Grid,
     ("encounters", "random"): Random,
     ("encounters", "pairs"): Pairs,
+    ("encounters", "drawn"): Drawn,
     ("encounters", "pairs", "rules"): PairRules,
     ("test",): Rules,
 }
@@ -276,7 +317,8 @@ _KINDS = "grid, random, pairs, routes"
 def _first_problem(error: ValidationError) -> str:
     first = min(error.errors(), key=lambda one: one["type"] == "missing")  # a misspelt key is missing, too
     *place, key = first["loc"]
-    shown = ".".join(str(part) for part in first["loc"] if part not in ("grid", "random", "pairs", "routes", "[key]"))
+    kinds = ("grid", "random", "drawn", "pairs", "routes", "[key]")
+    shown = ".".join(str(part) for part in first["loc"] if part not in kinds)
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         section = _KNOWN.get(tuple(str(part) for part in place), Span)
         if issubclass(section, BaseModel):

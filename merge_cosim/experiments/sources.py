@@ -11,7 +11,8 @@ import numpy as np
 
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import Grid, Pairs, Random, Routes, Scenario
+from merge_cosim.experiments.drawn import drawn_encounters
+from merge_cosim.experiments.scenario import Drawn, Grid, Pairs, Random, Routes, Scenario
 from merge_cosim.ngsim.data import data_files, episode_files, load_trajectories
 from merge_cosim.ngsim.encounters import at_site_point, site_encounters
 from merge_cosim.ngsim.sites import SITES, site
@@ -39,6 +40,9 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
         return _grid(scenario.encounters)
     if isinstance(scenario.encounters, Random):
         return _random(scenario.encounters)
+    if isinstance(scenario.encounters, Drawn):
+        encounters = drawn_encounters(scenario.encounters)
+        return replace(encounters, label=scenario.merging_car().intentions(encounters))
     if isinstance(scenario.encounters, Routes):
         return read_sumocfg(scenario.encounters.file)[1]
     parts = [

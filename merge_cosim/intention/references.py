@@ -9,7 +9,7 @@ from merge_cosim.encounter import Intention
 from merge_cosim.intention.base import Estimator, certain, estimators
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.streams import Keys
-from merge_cosim.units import FloatArray, IntArray
+from merge_cosim.units import TOLERANCE, FloatArray, IntArray
 
 
 @estimators.register
@@ -48,7 +48,10 @@ class AlwaysBrake(AlwaysYield):
 @estimators.register
 @dataclass(kw_only=True)
 class OracleLabel(Estimator):
-    """Knows the label. Not a bound: the host's own driving may turn the order round."""
+    """Knows the label. Not a bound: the host's own driving may turn the order round.
+
+    Where a case has no label (a scripted driver who ignores the host), who arrives first goes first, as in `slot-time`.
+    """
 
     name: ClassVar[str] = "oracle-label"
     needs_label: ClassVar[bool] = True
@@ -64,4 +67,5 @@ class OracleLabel(Estimator):
 
     def update(self, seen: Observation) -> FloatArray:
         """The label, from the first cycle to the last."""
-        return certain(self._labels == Intention.NOT_YIELD)
+        first = seen.merging_arrival - seen.host_arrival <= TOLERANCE
+        return certain(np.where(self._labels == Intention.UNKNOWN, first, self._labels == Intention.NOT_YIELD))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from merge_cosim.encounter import Encounters
+import numpy as np
+
+from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.registry import Component, Registry
 from merge_cosim.units import FloatArray, IntArray
@@ -28,6 +30,10 @@ class MergingCar(Component):
             age: Cycles since each encounter's start, shape (n,).
             now: The true state of both cars.
         """
+
+    def intentions(self, encounters: Encounters) -> IntArray:
+        """What the drivers of some encounters mean to do (`Intention`), where it is scripted; shape (n,)."""
+        return np.full(len(encounters), int(Intention.UNKNOWN))
 
     def observed_speed(self, age: IntArray, speed: FloatArray) -> FloatArray:
         """The speed [m/s] that the host's sensors report for him; the true one unless the log says otherwise."""

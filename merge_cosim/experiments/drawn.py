@@ -1,0 +1,56 @@
+"""Random initial states, each from a stream of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from merge_cosim.encounter import Encounters, Intention
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.scenario import Drawn
+from merge_cosim.streams import stream_keys, uniform
+
+ATTEMPTS = 200
+"""Merging-car states drawn for one case before the spans are found not to fit together."""
+
+
+def drawn_encounters(drawn: Drawn) -> Encounters:
+    """Return the encounters that `drawn` describes.
+
+    Raises:
+        UserError: The spans leave some case without a host that matches.
+    """
+    n = drawn.count
+    case = np.array([f"drawn-{drawn.seed}-{i:05d}" for i in range(n)])
+    keys = stream_keys(np.array([f"start/{name}" for name in case]), drawn.seed)
+    fixed = uniform(keys, np.zeros(n, dtype=np.int64), 2)
+    lead = drawn.max_lead * (2.0 * fixed[:, 0] - 1.0)
+    way, speed, low, high = (np.zeros(n) for _ in range(4))
+    for attempt in range(ATTEMPTS):
+        open_ = np.flatnonzero(low >= high)
+        if not len(open_):
+            break
+        u = uniform(keys[open_], np.full(len(open_), 2 + 2 * attempt), 2)
+        way[open_] = drawn.nearest + u[:, 0] * (drawn.farthest - drawn.nearest)
+        speed[open_] = drawn.slowest + u[:, 1] * (drawn.fastest - drawn.slowest)
+        arrival = np.maximum(way[open_] / speed[open_] - lead[open_], 1e-3)
+        low[open_] = np.maximum(drawn.slowest, drawn.nearest / arrival)
+        high[open_] = np.minimum(drawn.fastest, drawn.farthest / arrival)
+    else:
+        raise UserError("encounters: no host within these ways and speeds arrives max_lead before or after its rival")
+    host_speed = low + fixed[:, 1] * (high - low)
+    return Encounters(
+        case=case,
+        site=np.full(n, "designed"),
+        source=np.full(n, "designed"),
+        car=np.char.add("designed/", case),
+        host_station=-host_speed * (way / speed - lead),
+        host_speed=host_speed,
+        host_length=np.full(n, drawn.length),
+        merging_station=-way,
+        merging_speed=speed,
+        merging_length=np.full(n, drawn.length),
+        merge_position=np.zeros(n),
+        label=np.full(n, int(Intention.UNKNOWN)),
+        smoothed_source=np.zeros(n, dtype=bool),
+        length_missing=np.zeros(n, dtype=bool),
+    )
