@@ -36,6 +36,9 @@ Data = Annotated[Path | None, typer.Option(help="Folder with NGSIM files (else $
 Model = Annotated[str | None, typer.Option(help="Model file, or name of a model that comes with the project.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, such as acc.headway=1.2 or test.horizon=5.")]
 Plugins = Annotated[list[Path] | None, typer.Option(help="Python file with components of your own.")]
+Against = Annotated[
+    str | None, typer.Option(help="Method to compare the others with on the same cases; pgm if it was run.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Seed = Annotated[int, typer.Option(help="Seed of SUMO and of every random stream.")]
 
@@ -53,6 +56,7 @@ def sweep(
     source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
     seed: Seed = 0,
     plugin: Plugins = None,
+    against: Against = None,
     out: Annotated[Path, typer.Option(help="Result folder.")] = Path("out"),
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
     start: Annotated[Start, typer.Option(help="How processes are started.")] = "spawn",
@@ -82,6 +86,7 @@ def sweep(
         jobs=jobs or os.cpu_count() or 1,
         start=start,
         dask=dask,
+        against=against,
     )
     try:
         with sweep_progress() as progress:
@@ -192,12 +197,13 @@ def train(
 @app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
+    against: Against = None,
     json: Json = False,
 ) -> None:
     """Make one offline HTML page of a sweep: tables, failure maps, one case in detail."""
     from merge_cosim.report.page import write_report
 
-    file = write_report(folder)
+    file = write_report(folder, against)
     if json:
         print_json({"report": str(file)})
     else:

@@ -25,6 +25,7 @@ from merge_cosim.experiments.methods import (
 )
 from merge_cosim.experiments.scenario import Scenario, load_scenario
 from merge_cosim.experiments.sources import SourceChoice, load_encounters
+from merge_cosim.experiments.statistics.comparison import reference_of
 from merge_cosim.experiments.work import Batch
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
@@ -51,6 +52,7 @@ class SweepRequest:
         jobs: Processes.
         start: How processes come to be, see `executors.Processes`.
         dask: Address of a Dask scheduler, or `local`; None for processes of this machine.
+        against: Method that the others are compared with on the same cases; None for pgm, if it is there.
     """
 
     scenarios: Sequence[str]
@@ -65,6 +67,7 @@ class SweepRequest:
     jobs: int = 1
     start: StartMethod = "spawn"
     dask: str | None = None
+    against: str | None = None
 
 
 def plan(request: SweepRequest) -> list[Batch]:
@@ -92,7 +95,14 @@ def plan(request: SweepRequest) -> list[Batch]:
                 batches += _scenario_batches(scenario, label, methods, loaded[key], request)
     if not batches:
         raise UserError("nothing to run: no method fits the scenarios")
+    reference_of(method_names(request, batches), request.against)
     return batches
+
+
+def method_names(request: SweepRequest, batches: Sequence[Batch]) -> list[str]:
+    """Names of all methods that will have rows."""
+    derived = {ORACLE_BEST} if not request.methods or ORACLE_BEST in request.methods else set()
+    return sorted({batch.method.name for batch in batches} | derived)
 
 
 def _scenarios(names: Sequence[str], settings: dict[str, Any], varied: str) -> list[Scenario]:

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.outcome import KEY, SCHEMA, SCHEMA_VERSION
 
+STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV = "strata.csv", "belief.csv", "calibration.csv"
 RESULTS, SUMMARY_CSV, SUMMARY_JSON, MANIFEST, TRACES = (
     "results.parquet",
     "summary.csv",

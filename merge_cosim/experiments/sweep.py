@@ -15,9 +15,18 @@ from merge_cosim.experiments.alone import run_alone
 from merge_cosim.experiments.executors import executor_for
 from merge_cosim.experiments.methods import ORACLE_BEST
 from merge_cosim.experiments.pieces import Handout, Piece, cut
-from merge_cosim.experiments.plan import SweepRequest, identity, plan
-from merge_cosim.experiments.statistics import oracle_best, summarise
-from merge_cosim.experiments.store import MANIFEST, SUMMARY_CSV, SUMMARY_JSON, ResultFolder
+from merge_cosim.experiments.plan import SweepRequest, identity, method_names, plan
+from merge_cosim.experiments.statistics import belief, calibration, oracle_best, strata, summarise
+from merge_cosim.experiments.statistics.comparison import reference_of
+from merge_cosim.experiments.store import (
+    BELIEF_CSV,
+    CALIBRATION_CSV,
+    MANIFEST,
+    STRATA_CSV,
+    SUMMARY_CSV,
+    SUMMARY_JSON,
+    ResultFolder,
+)
 from merge_cosim.experiments.work import Batch
 
 __all__ = ["SweepRequest", "plan", "sweep"]
@@ -54,7 +63,7 @@ def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Prog
     ran = perf_counter()
     wants_best = not request.methods or ORACLE_BEST in request.methods
     folder.merge(oracle_best if wants_best else None)
-    _sum_up(batches, folder, tally)
+    _sum_up(batches, folder, tally, reference_of(method_names(request, batches), request.against))
     effort, run_s = tally.effort, ran - planned
     manifest = {
         **what,
@@ -93,8 +102,8 @@ def _run(request: SweepRequest, pieces: Sequence[Piece], folder: ResultFolder, p
     return tally
 
 
-def _sum_up(batches: Sequence[Batch], folder: ResultFolder, tally: _Tally) -> None:
-    """Write the traces and the summary, one scenario and variation at a time."""
+def _sum_up(batches: Sequence[Batch], folder: ResultFolder, tally: _Tally, against: str | None) -> None:
+    """Write the traces, the summary and the tables beside it, one scenario and variation at a time."""
     single_us, traces = run_alone(batches, folder)
     folder.write_traces(traces)
     cycle_us = {
@@ -102,6 +111,16 @@ def _sum_up(batches: Sequence[Batch], folder: ResultFolder, tally: _Tally) -> No
         for name, effort in tally.by_method.items()
         if effort.encounter_cycles
     }
-    summary = pd.concat([summarise(folder.rows_of(*group), cycle_us) for group in folder.groups()], ignore_index=True)
-    summary.to_csv(folder.path / SUMMARY_CSV, index=False)
+    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in (SUMMARY_CSV, STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV)}
+    for group in folder.groups():
+        rows = folder.rows_of(*group)
+        parts[SUMMARY_CSV].append(summarise(rows, cycle_us, against))
+        parts[STRATA_CSV].append(strata(rows, against))
+        parts[BELIEF_CSV].append(belief(rows))
+        parts[CALIBRATION_CSV].append(calibration(rows))
+    tables = {name: pd.concat(found, ignore_index=True) for name, found in parts.items()}
+    for name, table in tables.items():
+        if len(table):
+            table.to_csv(folder.path / name, index=False)
+    summary = tables[SUMMARY_CSV]
     folder.write_json(SUMMARY_JSON, summary.astype(object).where(summary.notna(), None).to_dict("records"))

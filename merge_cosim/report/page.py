@@ -10,14 +10,16 @@ from typing import Any
 import pandas as pd
 
 from merge_cosim.errors import UserError
+from merge_cosim.experiments.statistics.comparison import reference_of
+from merge_cosim.experiments.statistics.summary import ALL_SITES, GROUP, compare_all
 from merge_cosim.experiments.store import MANIFEST, SUMMARY_JSON, TRACES, ResultFolder
-from merge_cosim.report import case_figures, collisions, set_figures, tables
+from merge_cosim.report import case_figures, collisions, measure_tables, set_figures, tables
 from merge_cosim.report.columns import Table
 from merge_cosim.report.export import write_tables
 from merge_cosim.report.html import Picture, render
 from merge_cosim.report.methods import Look, in_order, looks
 from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER, PUBLISHED
-from merge_cosim.report.tables import ALL_SITES, Section
+from merge_cosim.report.tables import Section
 
 REPORT = "report.html"
 SOURCES = {
@@ -42,17 +44,21 @@ class Chapter:
     pictures: list[Picture]
 
 
-def write_report(folder: Path) -> Path:
+def write_report(folder: Path, against: str | None = None) -> Path:
     """Write `report.html` and `tables/` into a result folder; returns the page.
 
+    Args:
+        folder: The result folder.
+        against: Method to compare the others with; None for the one that the sweep chose.
+
     Raises:
-        UserError: The folder holds no finished sweep.
+        UserError: The folder holds no finished sweep, or not the method to compare with.
     """
     store = ResultFolder(folder)
     results = store.results().to_pandas()
     manifest = store.read_json(MANIFEST)
     labels = [f"{name}={value}" for name, values in manifest["variations"] for value in values]
-    summary = tables.summary_frame(store.read_json(SUMMARY_JSON), labels)
+    summary = tables.summary_frame(_compared(store.read_json(SUMMARY_JSON), results, against), labels)
     if not (folder / TRACES).is_file():
         raise UserError(f"{folder / TRACES}: missing; run the sweep again")
     traces = store.traces().to_pandas()
@@ -82,6 +88,14 @@ def write_report(folder: Path) -> Path:
     return file
 
 
+def _compared(rows: list[dict[str, Any]], results: pd.DataFrame, against: str | None) -> list[dict[str, Any]]:
+    """Summary rows with the comparison that the reader asks for in place of the sweep's."""
+    if against is None:
+        return rows
+    found = compare_all(results, reference_of(sorted(set(results["method"])), against))
+    return [row | found[tuple(row[name] for name in GROUP)] for row in rows]
+
+
 def _chapter(
     section: Section,
     results: pd.DataFrame,
@@ -93,7 +107,14 @@ def _chapter(
     rows = section.of(results)
     scenario = manifest["scenarios"][section.scenario]
     is_grid = scenario["encounters"]["kind"] == "grid"
-    found = {"outcome": tables.main_table(summary, section), "ambiguity": tables.strata_table(results, section)}
+    found = {
+        "outcome": tables.main_table(summary, section),
+        "ambiguity": tables.strata_table(results, section),
+        "safety": measure_tables.safety_table(summary, section),
+    }
+    beliefs = measure_tables.belief_table(results, section)
+    if beliefs is not None:
+        found["belief"] = beliefs
     pictures = [] if section.site == ALL_SITES else _case_pictures(section, rows, traces, drawn)
     if is_grid:
         caption = (

@@ -11,13 +11,10 @@ import numpy as np
 import pandas as pd
 
 from merge_cosim.experiments.methods import HUMAN, ORACLE_BEST
+from merge_cosim.experiments.statistics.summary import ALL_SITES, AMBIGUITY_EDGES
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order, is_reference
 from merge_cosim.report.published import published
-
-ALL_SITES = "all"
-AMBIGUITY_EDGES = (0.0, 1.0, 3.0, np.inf)
-"""Strata of |T_m - T_h| at the start [s]."""
 
 METHOD = Column("method", "method")
 MAIN = (
@@ -77,9 +74,9 @@ def summary_frame(rows: list[dict[str, Any]], variations: Sequence[str] = ()) ->
     frame["published_distance_m"] = pd.Series(
         [figure.distance_m if figure else None for figure in figures], dtype=float
     )
-    frame["interval_pct"] = _ranges(frame["ci_low_pct"], frame["ci_high_pct"])
+    frame["interval_pct"] = ranges(frame["ci_low_pct"], frame["ci_high_pct"])
     censored = frame["censored"] > 0
-    frame["bounds_pct"] = _ranges(frame["failure_pct_best"].where(censored), frame["failure_pct_worst"].where(censored))
+    frame["bounds_pct"] = ranges(frame["failure_pct_best"].where(censored), frame["failure_pct_worst"].where(censored))
     differs = frame["failure_pct_own"].ne(frame["failure_pct"]) & frame["failure_pct"].notna()
     if not differs.any():
         frame["failure_pct_own"] = np.nan
@@ -97,7 +94,7 @@ def sections(summary: pd.DataFrame) -> list[Section]:
 
 def main_table(summary: pd.DataFrame, section: Section) -> Table:
     """Every measure per method, ours beside the published figures."""
-    rows = _of_section(summary, section)
+    rows = of_section(summary, section)
     return Table.of(rows, MAIN, list(map(is_reference, rows["method"])), "Outcome by method")
 
 
@@ -152,12 +149,14 @@ def runs_in_sumo(results: pd.DataFrame) -> pd.DataFrame:
     return results[~results["method"].isin((ORACLE_BEST, HUMAN))]
 
 
-def _of_section(summary: pd.DataFrame, section: Section) -> pd.DataFrame:
+def of_section(summary: pd.DataFrame, section: Section) -> pd.DataFrame:
+    """The summary rows of a section, variations left out."""
     rows = summary[summary["variation"] == ""]
     same = (rows["scenario"] == section.scenario) & (rows["site"] == section.site) & (rows["source"] == section.source)
     return rows[same]
 
 
-def _ranges(low: pd.Series, high: pd.Series) -> list[str | None]:
+def ranges(low: pd.Series, high: pd.Series) -> list[str | None]:
+    """Write intervals; None where an end is missing."""
     pairs = zip(low.tolist(), high.tolist(), strict=True)
     return [None if pd.isna(a) or pd.isna(b) else f"{a:.1f}–{b:.1f}" for a, b in pairs]

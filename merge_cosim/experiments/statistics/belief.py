@@ -1,0 +1,113 @@
+"""How good the beliefs were at fixed distances of the merging car, in closed loop: accuracy, AUC, Brier, log loss."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from merge_cosim.cosim.decisions import GATES
+from merge_cosim.experiments.statistics.summary import ALL_STARTS, GROUP, by_start, with_all_sites
+from merge_cosim.units import BoolArray, FloatArray
+
+BINS = 10
+"""Bins of P(NOT_YIELD) by which calibration is judged."""
+
+
+def belief(rows: pa.Table) -> pd.DataFrame:
+    """One row per group, start (all, and by ambiguity) and gate; empty where no case has a label.
+
+    `n` cases have a label and pass the gate undecided. A rule without doubt has an accuracy alone; `auc_arrival` is the
+    AUC of T_h - T_m at the same gates of the same runs, and so what the geometry alone tells there.
+    """
+    found = []
+    for key, start, group in _groups(rows):
+        for gate in GATES:
+            known = group[group[f"log_odds_{gate}"].notna()]
+            if len(known):
+                odds, lead = known[f"log_odds_{gate}"].to_numpy(), known[f"arrival_lead_{gate}"].to_numpy()
+                truth = (known["label"] == "NOT_YIELD").to_numpy()
+                found.append(key | {"start": start, "gate_m": gate, **scores(odds, truth), **_of_lead(lead, truth)})
+    return pd.DataFrame(found)
+
+
+def calibration(rows: pa.Table) -> pd.DataFrame:
+    """Counts, mean belief and observed share of NOT_YIELD by bin of belief: one row per group, gate and filled bin."""
+    found = []
+    for key, start, group in _groups(rows):
+        if start != ALL_STARTS:
+            continue
+        for gate in GATES:
+            known = group[np.isfinite(group[f"log_odds_{gate}"].to_numpy(dtype=float))]
+            probability = _probability(known[f"log_odds_{gate}"].to_numpy())
+            truth = (known["label"] == "NOT_YIELD").to_numpy()
+            for low, n, mean, share in _bins(probability, truth):
+                found.append(
+                    key | {"gate_m": gate, "from": low, "to": low + 1 / BINS, "n": n}
+                    | {"mean_belief": round(mean, 6), "not_yield_share": round(share, 6)}
+                )  # fmt: skip
+    return pd.DataFrame(found)
+
+
+def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
+    """Score beliefs against labels.
+
+    Args:
+        log_odds: `log P(NOT_YIELD) - log P(YIELD)`, shape (n,), n > 0.
+        truth: The label is NOT_YIELD, shape (n,).
+    """
+    from sklearn.metrics import brier_score_loss, roc_auc_score
+
+    found: dict[str, Any] = {
+        "n": len(truth),
+        "not_yield": int(truth.sum()),
+        "accuracy_pct": round(100 * float(((log_odds >= 0) == truth).mean()), 4),
+        **dict.fromkeys(("auc", "brier", "log_loss", "calibration_error")),
+    }
+    if np.isinf(log_odds).all():
+        return found
+    probability = _probability(log_odds)
+    surprise = float(np.logaddexp(0.0, np.where(truth, -log_odds, log_odds)).mean())
+    errors = [n * abs(mean - share) for _, n, mean, share in _bins(probability, truth)]
+    found["brier"] = round(float(brier_score_loss(truth, probability)), 6)
+    found["log_loss"] = round(surprise, 6) if np.isfinite(surprise) else None
+    found["calibration_error"] = round(sum(errors) / len(truth), 6)
+    if 0 < truth.sum() < len(truth):
+        found["auc"] = round(float(roc_auc_score(truth, probability)), 6)
+    return found
+
+
+def _of_lead(lead: FloatArray, truth: BoolArray) -> dict[str, float | None]:
+    from sklearn.metrics import roc_auc_score
+
+    mixed = 0 < truth.sum() < len(truth)
+    return {"auc_arrival": round(float(roc_auc_score(truth, lead)), 6) if mixed else None}
+
+
+def _groups(rows: pa.Table) -> Iterator[tuple[dict[str, str], str, pd.DataFrame]]:
+    frame = rows.to_pandas()
+    frame = frame[frame["label"] != ""]
+    for key, group in with_all_sites(frame).groupby(GROUP, sort=True):
+        names = dict(zip(GROUP, map(str, key), strict=True))
+        yield names, ALL_STARTS, group
+        if not names["variation"]:
+            for start, part in by_start(group):
+                yield names, start, part
+
+
+def _probability(log_odds: FloatArray) -> FloatArray:
+    from scipy.special import expit
+
+    values: FloatArray = expit(log_odds)
+    return values
+
+
+def _bins(probability: FloatArray, truth: BoolArray) -> Iterator[tuple[float, int, float, float]]:
+    """Lower edge, count, mean belief and share of NOT_YIELD of each filled bin."""
+    bins = np.minimum((probability * BINS).astype(int), BINS - 1)
+    for number in np.unique(bins):
+        here = bins == number
+        yield number / BINS, int(here.sum()), float(probability[here].mean()), float(truth[here].mean())

@@ -1,0 +1,69 @@
+"""Tables beside the main one: surrogate safety and comparison, and how good the beliefs were on the way."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pyarrow as pa
+
+from merge_cosim.experiments.outcome import SCHEMA
+from merge_cosim.experiments.statistics import belief
+from merge_cosim.experiments.statistics.summary import ALL_STARTS
+from merge_cosim.report.columns import Column, Table
+from merge_cosim.report.methods import in_order, is_reference
+from merge_cosim.report.tables import METHOD, Section, of_section, ranges
+
+SAFETY = (
+    METHOD,
+    Column("cluster_pct", "failures % by car", None, "95 % intervals, bootstrap"),
+    Column("distance_interval_m", "D m", None, "95 % intervals, bootstrap"),
+    Column("min_ttc_s_p05", "TTC 5 % s", 2, "surrogate safety"),
+    Column("max_drac_p95", "DRAC 95 % m/s²", 2, "surrogate safety"),
+    Column("pet_s_p05", "PET 5 % s", 2, "surrogate safety"),
+    Column("mean_jerk", "jerk m/s³", 2, "comfort"),
+    Column("human_station_rms_m", "station m", 1, "RMS from the human"),
+    Column("human_speed_rms", "speed m/s", 2, "RMS from the human"),
+    Column("labelled", "n", 0, "stable and right"),
+    Column("first_stable_pct", "%", 1, "stable and right"),
+    Column("first_stable_s", "from s", 2, "stable and right"),
+)
+BELIEF = (
+    METHOD,
+    Column("gate_m", "m away", 0),
+    Column("n", "n", 0),
+    Column("accuracy_pct", "right %", 1),
+    Column("auc", "AUC", 3),
+    Column("auc_arrival", "AUC of T_h − T_m", 3),
+    Column("brier", "Brier", 3),
+    Column("log_loss", "log loss", 3),
+    Column("calibration_error", "calibration error", 3),
+)
+
+
+def safety_table(summary: pd.DataFrame, section: Section) -> Table:
+    """Surrogate safety, comfort, likeness to the human, and the failures of each pair of methods on the same cases."""
+    rows = of_section(summary, section).copy()
+    rows["cluster_pct"] = ranges(rows["cluster_low_pct"], rows["cluster_high_pct"])
+    rows["distance_interval_m"] = ranges(rows["distance_low_m"], rows["distance_high_m"])
+    against = rows["against"].dropna().unique()
+    group = f"against {against[0]}" if len(against) else ""
+    compared = (
+        Column("only_this_fails", "only this fails", 0, group),
+        Column("only_other_fails", "only that fails", 0, group),
+        Column("mcnemar_p", "McNemar p", 4, group),
+    )
+    title = "Surrogate safety, and failures on the same cases"
+    return Table.of(rows, (*SAFETY, *compared), list(map(is_reference, rows["method"])), title)
+
+
+def belief_table(results: pd.DataFrame, section: Section) -> Table | None:
+    """Beliefs by distance of the merging car, in closed loop; None where no case has a label."""
+    rows = section.of(results)
+    found = belief(pa.Table.from_pandas(rows, schema=SCHEMA, preserve_index=False))
+    if not len(found):
+        return None
+    found = found[found["start"] == ALL_STARTS]
+    found = found[(found["site"] == section.site) | (found["site"].nunique() == 1)]
+    order = {method: i for i, method in enumerate(in_order(found["method"]))}
+    found = found.assign(order=found["method"].map(order)).sort_values(["order", "gate_m"], ascending=[True, False])
+    title = "Beliefs at fixed distances of the merging car"
+    return Table.of(found, BELIEF, list(map(is_reference, found["method"])), title)
