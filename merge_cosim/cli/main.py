@@ -234,6 +234,30 @@ def bench(
 
 
 @app.command()
+def bounds(
+    scenario: Annotated[str, typer.Argument(help="Replay scenario, or its file.")],
+    set_: Sets = None,
+    data: Data = None,
+    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write one row per case to this .csv file.")] = None,
+    json: Json = False,
+) -> None:
+    """Count the cases of a replay that no host could pass without a failure, or not without a long delay."""
+    from merge_cosim.experiments.bounds import bounds_of
+    from merge_cosim.experiments.methods import parse_setting
+    from merge_cosim.ngsim.data import find_data
+
+    cases, rows = bounds_of(scenario, dict(map(parse_setting, set_ or ())), find_data(data), source)
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        cases.to_csv(out, index=False)
+    if json:
+        print_json(rows)
+    else:
+        show_table(rows, f"{scenario}: what any host could have done")
+
+
+@app.command()
 def methods(plugin: Plugins = None, json: Json = False) -> None:
     """List estimators, controllers and merging cars with their parameters."""
     from merge_cosim.experiments.catalogue import components
