@@ -1,14 +1,23 @@
 """Printing: tables for people, JSON for programs, one line for mistakes."""
 
 import json
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
 
 def print_json(document: Any) -> None:
-    """Print one JSON document on standard output."""
-    print(json.dumps(document, indent=1, default=str))
+    """Print one JSON document on standard output; infinite numbers, which JSON has not, as `"inf"` and `"-inf"`."""
+    print(json.dumps(_finite(document), indent=1, default=str, allow_nan=False))
+
+
+def _finite(document: Any) -> Any:
+    if isinstance(document, dict):
+        return {key: _finite(value) for key, value in document.items()}
+    if isinstance(document, list | tuple):
+        return [_finite(value) for value in document]
+    return str(document) if isinstance(document, float) and not math.isfinite(document) else document
 
 
 def die(message: str) -> NoReturn:

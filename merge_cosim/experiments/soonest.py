@@ -2,9 +2,9 @@
 
 The host must stay below station 0 until it arrives, and from then on, for the scored horizon, behind the merging car's
 rear bumper. For a given cycle of arrival these conditions are convex in the accelerations, so that at each cycle and
-speed the reachable stations are an interval, and its two ends are all that has to be carried along. Within the horizon a
-station counts only if full braking from it stays behind to the horizon's end. Speeds lie on a grid, with accelerations
-that lead from one of its points to another: every path found can be driven, and none is found too soon.
+speed the reachable stations are an interval, and its two ends are all that has to be carried along. Within the horizon
+a station counts only if full braking from it stays behind to the horizon's end. Speeds lie on a grid, with
+accelerations that lead from one of its points to another: every path found can be driven, and none is found too soon.
 """
 
 from __future__ import annotations
@@ -84,7 +84,8 @@ def soonest_behind(ahead: Ahead, station: float, speed: float, goal: float, reac
 
     Args:
         ahead: The merging car.
-        station, speed: The host's initial state [m, m/s], upstream of the merging point.
+        station: The host's initial station [m], upstream of the merging point.
+        speed: Its initial speed [m/s].
         goal: Station to reach [m], positive.
         reach: The host's bounds.
     """

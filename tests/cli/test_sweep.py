@@ -96,7 +96,8 @@ def test_a_case_alone_ends_as_in_the_sweep(tmp_path):
             "run", scenario, "--case", case, "--method", "acc", "--trace", f"{case}.csv", "--json", cwd=tmp_path
         )
         assert alone.returncode == 0, alone.stderr
-        assert json.loads(alone.stdout) == in_sweep[case]
+        row = {name: float(v) if v in ("inf", "-inf") else v for name, v in json.loads(alone.stdout).items()}
+        assert row == in_sweep[case]
         assert (tmp_path / f"{case}.csv").read_text().startswith("time_s,host_station_m")
 
 
@@ -228,6 +229,10 @@ SLIPS = (
             ("run", "small.toml", "--case", "d+0_h5_m5", "--method", "acc", "--trace", "small.toml/x.csv"),
             "small.toml: cannot be",
         ),
+        (("sweep", "small.toml", "--method", "acc", "--against", "slto"), "--against slto: no such method"),
+        (("sweep", "small.toml", "--method", "human"), "nothing to run"),
+        (("sweep", "designed-3", "--set", "encounters.cuont=5"), "did you mean 'count'"),
+        (("bounds", "designed-2"), "bounds are against a log"),
         (("run", "small.toml", "--case", "d+0_h5_m5", "--method", "acc", "--trace", "x.txt"), "x.txt"),
     ],
 )
@@ -302,6 +307,11 @@ def test_replay_on_real_data(tmp_path, data_dir):
     assert set(rows["source"]) == {"ngsim"}
     assert set(rows["label"]) == {"YIELD", "NOT_YIELD"}
     assert rows.loc[rows["method"] == "pgm", "model"].unique().tolist() == ["us101-ngsim"]
+    human = rows[rows["method"] == "human"]
+    assert len(human) == rows["case"].nunique()
+    assert not human["failed"].any()
+    assert human["human_station_rms_m"].max() < 1e-6
+    assert human["correct_at_merge"].isna().all()
     oracle = rows[rows["method"] == "oracle-label"]
     assert oracle["correct_at_merge"].dropna().all()
 
@@ -313,3 +323,34 @@ def test_a_model_is_not_tested_on_its_own_training_cars(tmp_path, data_dir):
     )
     assert done.returncode == 2
     assert "was trained on" in done.stderr
+
+
+def test_hidden_intentions_through_the_command_line(tmp_path):
+    settings = ("--set", "encounters.count=60", "--set", "merging.sigma=0.2")
+    methods = [word for name in ("slot-time", "pgm", "oracle-label", "human") for word in ("--method", name)]
+    for jobs in (1, 2):
+        arguments = ("designed-3", *settings, *methods, "--against", "slot-time", "--out", f"out{jobs}")
+        done = merge_cosim("sweep", *arguments, "--jobs", jobs, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    one, two = ((tmp_path / f"out{jobs}/results.parquet").read_bytes() for jobs in (1, 2))
+    assert one == two
+    rows = summary(tmp_path / "out1")
+    assert set(rows) == {"slot-time", "pgm", "oracle-label"}  # nobody was logged
+    assert rows["pgm"]["against"] == "slot-time"
+    assert rows["pgm"]["only_this_fails"] is not None
+    assert rows["pgm"]["ci_high_pct"] > rows["pgm"]["failure_pct"]  # drawn cases are a sample
+    assert {"belief.csv", "calibration.csv", "strata.csv"} <= {file.name for file in (tmp_path / "out1").iterdir()}
+    case = pq.read_table(tmp_path / "out1/results.parquet").to_pylist()[5]
+    alone = merge_cosim(
+        *("run", "designed-3", *settings, "--case", case["case"], "--method", case["method"], "--json"), cwd=tmp_path
+    )
+    found = {
+        name: float(value) if value in ("inf", "-inf") else value for name, value in json.loads(alone.stdout).items()
+    }
+    assert found == case
+    report = merge_cosim("report", "out1", "--against", "oracle-label", cwd=tmp_path)
+    assert report.returncode == 0, report.stderr
+    assert "against oracle-label" in (tmp_path / "out1/report.html").read_text()
+    unknown = merge_cosim("report", "out1", "--against", "nosuch", cwd=tmp_path)
+    assert unknown.returncode == 2
+    assert "--against nosuch" in unknown.stderr

@@ -1,0 +1,50 @@
+"""What the measures have to do with each other, whatever the cars do."""
+
+import numpy as np
+from cases import random_encounters
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from merge_cosim.control.base import controllers
+from merge_cosim.cosim.loop import Driver, simulate
+from merge_cosim.cosim.plant import NumpyPlant
+from merge_cosim.cosim.scoring import KINDS, Rules
+from merge_cosim.experiments.outcome import post_encroachment
+from merge_cosim.intention.base import estimators
+from merge_cosim.observation import Setting
+from merge_cosim.traffic.base import merging_cars
+
+
+def outcome(seed, method):
+    encounters = random_encounters(40, seed)
+    driver = Driver(estimators[method](), controllers["acc"]())
+    run = simulate(NumpyPlant(40), encounters, driver, merging_cars["designed"](), Rules(), Setting())
+    return run.columns, post_encroachment(run.columns, encounters, 0.1)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from(["always-go", "always-yield", "slot-time"]))
+def test_failure_gap_time_and_encroachment_agree(seed, method):
+    c, pet = outcome(seed, method)
+    failed = c["kind"] > 0
+    side = c["kind"] == KINDS.index("side")
+    assert (c["min_gap_m"][failed] < -1e-6).all()
+    assert (c["min_gap_m"][~failed] >= -1e-6).all()
+    assert not (side & (pet > 0.1)).any()  # who leaves a whole cycle between them does not meet him at the point
+    assert failed[pet < -0.1].all()  # who arrives a whole cycle too early does
+    assert (c["min_ttc_s"] >= 0).all()
+    assert ((c["max_drac"] > 0) <= np.isfinite(c["min_ttc_s"])).all()
+    rear_end = failed & ~side
+    assert (np.nan_to_num(pet, nan=1.0)[rear_end] > -0.1).all()
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 10_000))
+def test_times_are_in_order(seed):
+    c, _ = outcome(seed, "slot-time")
+    for front, rear in (("host_reached_s", "host_cleared_s"), ("merging_reached_s", "merging_cleared_s")):
+        both = ~np.isnan(c[front]) & ~np.isnan(c[rear])
+        assert (c[rear][both] > c[front][both]).all()
+    decided = c["last_decision"] >= 0
+    assert (c["decided_from"][decided] <= c["end_cycle"][decided]).all()
+    assert ((c["decision_flips"] == 0) <= (c["decided_from"] == 0)).all()
