@@ -18,11 +18,11 @@ class Likeness:
     def __init__(self, block: FloatArray, log: ReplayLog | None) -> None:
         """Take the place for `LIKENESS`, shape (2, count), filled with zeros."""
         count = block.shape[1]
-        self._sums, self._own = block, np.zeros((2, count))
+        self._sums = block
         self._log = None if log is None else log.host_station
         if self._log is not None:
             speed = np.diff(self._log.values, prepend=0.0) / DT  # the first of each log is never read
-            self._state = np.stack([self._log.values, speed])
+            self._logs = self._log.values, speed
             self._first = np.zeros(count, dtype=np.int64)
             self._last = np.zeros(count, dtype=np.int64)
 
@@ -38,7 +38,7 @@ class Likeness:
             return
         at = self._first + age
         joint = at <= self._last
-        self._own[0], self._own[1] = now.host_station, now.host_speed
-        apart = self._own - self._state[:, np.minimum(at, self._last)]
-        apart *= joint
-        self._sums += apart * apart
+        at = np.minimum(at, self._last)
+        for total, log, own in zip(self._sums, self._logs, (now.host_station, now.host_speed), strict=True):
+            apart = (own - log.take(at)) * joint
+            total += apart * apart

@@ -344,10 +344,8 @@ def test_hidden_intentions_through_the_command_line(tmp_path):
     alone = merge_cosim(
         *("run", "designed-3", *settings, "--case", case["case"], "--method", case["method"], "--json"), cwd=tmp_path
     )
-    found = {
-        name: float(value) if value in ("inf", "-inf") else value for name, value in json.loads(alone.stdout).items()
-    }
-    assert found == case
+    row = {name: float(v) if v in ("inf", "-inf") else v for name, v in json.loads(alone.stdout).items()}
+    assert row == case
     report = merge_cosim("report", "out1", "--against", "oracle-label", cwd=tmp_path)
     assert report.returncode == 0, report.stderr
     assert "against oracle-label" in (tmp_path / "out1/report.html").read_text()
