@@ -76,7 +76,7 @@ class Scorer:
         self._times = self.block[own - len(CROSSINGS) : own]
         self._decisions = Decisions(self.block[own : own + decided])
         self._likeness = Likeness(self.block[own + decided :], log)
-        self._lines, self._past = np.zeros_like(self._times), np.zeros_like(self._times, dtype=bool)
+        self._lines, self._past = np.full_like(self._times, np.inf), np.zeros_like(self._times, dtype=bool)
         self._braking = np.zeros(count)
         self._begun: list[IntArray] = []
 

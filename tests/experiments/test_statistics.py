@@ -122,6 +122,7 @@ def labelled(n=200, seed=0):
             "log_odds_40": odds[i],
             "arrival_lead_40": odds[i] if i % 2 else -odds[i],
             "ambiguity_s": i % 4,
+            "correct_at_merge": bool(truth[i] == (odds[i] >= 0)),
             "first_stable_s": 1.0 if truth[i] == (odds[i] >= 0) else None,
         }
         for i in range(n)

@@ -57,7 +57,8 @@ def bootstrap_means(values: pd.DataFrame, clusters: pd.Series) -> list[Interval]
 def _weights(clusters: int) -> FloatArray:
     """How often each cluster is drawn in each resample, shape (RESAMPLES, clusters)."""
     rng = np.random.default_rng(SEED)
-    return rng.multinomial(clusters, np.full(clusters, 1.0 / clusters), size=RESAMPLES).astype(float)
+    draws = (rng.integers(clusters, size=clusters) for _ in range(RESAMPLES))
+    return np.array([np.bincount(draw, minlength=clusters) for draw in draws], dtype=float)
 
 
 def percent(part: int, whole: int) -> float | None:

@@ -119,7 +119,7 @@ def _summary(
     low, high = wilson(failures, n) if _is_sample(group) else (None, None)
     batch_us, single_us = cycle_us.get(key["method"], (None, None))
     own = scored[scored["failure_kind"] != "merging_into_host"]
-    labelled = group[group["label"] != ""]
+    labelled = group[group["correct_at_merge"].notna()]
     return {
         **key,
         "n": n,
