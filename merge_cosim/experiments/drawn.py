@@ -41,8 +41,8 @@ def drawn_encounters(drawn: Drawn) -> Encounters:
     return Encounters(
         case=case,
         site=np.full(n, "designed"),
-        source=np.full(n, "designed"),
-        car=np.char.add("designed/", case),
+        source=np.full(n, "random"),
+        car=np.full(n, ""),
         host_station=-host_speed * (way / speed - lead),
         host_speed=host_speed,
         host_length=np.full(n, drawn.length),

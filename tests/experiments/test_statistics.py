@@ -51,7 +51,7 @@ def test_discordant_cases_are_those_that_both_carry_to_the_end():
     assert (row["only_this_fails"], row["only_other_fails"]) == (1, 2)  # b; d and e
     assert row["mcnemar_p"] == pytest.approx(1.0)
     assert pd.isna(summary.loc["other", "only_this_fails"])
-    grid = summarise(table(*(row | {"car": ""} for row in rows)), {}, against="other").set_index("method")
+    grid = summarise(table(*(row | {"source": "designed"} for row in rows)), {}, against="other").set_index("method")
     assert grid.loc["this", "only_other_fails"] == 2
     assert pd.isna(grid.loc["this", "mcnemar_p"])
 
@@ -83,6 +83,15 @@ def test_bootstrap_covers_the_mean_about_as_often_as_it_says():
         ((low, high),) = bootstrap_means(pd.DataFrame({"x": rng.exponential(1.0, 60)}), pd.Series(np.arange(60)))
         covered += low <= 1.0 <= high
     assert 0.87 <= covered / 200 <= 0.99
+
+
+def test_many_clusters_take_the_normal_approximation():
+    rng = np.random.default_rng(5)
+    few = pd.DataFrame({"x": rng.normal(20, 5, 9_000)})
+    many = pd.DataFrame({"x": rng.normal(20, 5, 11_000)})
+    for values in (few, many):
+        ((low, high),) = bootstrap_means(values, pd.Series(np.arange(len(values))))
+        assert (high - low) / 2 == pytest.approx(1.96 * 5 / len(values) ** 0.5, rel=0.1)
 
 
 def test_missing_values_do_not_count_and_one_car_has_no_interval():

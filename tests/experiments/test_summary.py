@@ -103,5 +103,5 @@ def test_sites_are_pooled_only_within_one_source():
 
 
 def test_a_fixed_grid_has_no_interval():
-    row = summarise(table({"case": "a", "method": "m", "source": "designed", "car": ""}), {}).iloc[0]
+    row = summarise(table({"case": "a", "method": "m", "source": "designed"}), {}).iloc[0]
     assert pd.isna(row["ci_low_pct"])

@@ -106,8 +106,8 @@ def _summaries(
 
 
 def _is_sample(group: pd.DataFrame) -> bool:
-    """Cases of named cars are a sample; a fixed grid has none."""
-    return bool((group["car"] != "").all())
+    """A fixed grid is no sample."""
+    return bool((group["source"] != "designed").all())
 
 
 def _summary(
@@ -163,16 +163,18 @@ def _summary(
 def _intervals(group: pd.DataFrame) -> dict[str, Any]:
     """Bootstrap intervals over merging cars: of the failure rate where a car has several cases, and of D."""
     names = ("cluster_low_pct", "cluster_high_pct", "distance_low_m", "distance_high_m")
-    cars = group["car"].nunique() if _is_sample(group) else None
-    if not cars:
+    if not _is_sample(group):
         return {"cars": None, **dict.fromkeys(names)}
+    logged = bool((group["car"] != "").all())
+    clusters = group["car"] if logged else group["case"]
+    several = clusters.nunique() < len(group)
     failed = (100.0 * group["failed"]).where(~group["censored"])
     values = pd.DataFrame({"failed": failed, "distance": group["distance_m"]})
-    rate, distance = bootstrap_means(values, group["car"])
-    if cars == len(group):
+    rate, distance = bootstrap_means(values, clusters)
+    if not several:
         rate = (None, None)
     ends = (None if end is None else round(end, 4) for end in (*rate, *distance))
-    return {"cars": cars, **dict(zip(names, ends, strict=True))}
+    return {"cars": clusters.nunique() if logged else None, **dict(zip(names, ends, strict=True))}
 
 
 def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
