@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from merge_cosim.encounter import Encounters, Intention
+from merge_cosim.experiments.statistics.belief import auc, scores
 from merge_cosim.intention.base import Estimator, estimators
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.intention.pgm import Pgm
@@ -89,7 +90,7 @@ def judge(model: IntentionModel, held_out: Encounters) -> dict[str, list[dict[st
         only, and the AUC of `T_h - T_m`. `calibration`: how often drivers of each band did not yield, by what the
         estimator gave for it.
     """
-    scores, calibrated = [], []
+    scored, calibrated = [], []
     for name in JUDGED:
         estimator = estimators[name]()
         if estimator.needs_model:
@@ -99,26 +100,19 @@ def judge(model: IntentionModel, held_out: Encounters) -> dict[str, list[dict[st
             here = watched.between(near, far)
             if len(here.log_odds):
                 where = {"estimator": name, "distance_m": f"{near:g}-{far:g}"}
-                scores.append(where | score(here))
+                scored.append(where | score(here))
                 calibrated += [where | row for row in calibration(here)]
-    return {"scores": scores, "calibration": calibrated}
+    return {"scores": scored, "calibration": calibrated}
 
 
 def score(watched: Watched) -> dict[str, Any]:
     """Frames, accuracy, log loss, AUC and Brier score; None where it is not defined."""
-    from sklearn.metrics import brier_score_loss, roc_auc_score  # slow to import, so only where it is used
-
-    odds, truth = watched.log_odds, watched.not_yield
-    doubts = bool(np.isfinite(odds).all())
-    signed = np.where(truth, odds, -odds)
-    auc = roc_auc_score(truth, odds if doubts else watched.margin) if 0 < truth.sum() < len(truth) else None
-    return {
-        "frames": len(odds),
-        "accuracy_pct": round(100 * float(((odds >= 0) == truth).mean()), 2),
-        "log_loss": round(float(np.logaddexp(0.0, -signed).mean()), 4) if doubts else None,
-        "auc": None if auc is None else round(float(auc), 4),
-        "brier": round(float(brier_score_loss(truth, _probability(odds))), 4) if doubts else None,
-    }
+    found = scores(watched.log_odds, watched.not_yield)
+    if found["brier"] is None:
+        found["auc"] = auc(watched.margin, watched.not_yield)
+    digits = {"accuracy_pct": 2, "log_loss": 4, "auc": 4, "brier": 4}
+    kept = {name: None if found[name] is None else round(found[name], n) for name, n in digits.items()}
+    return {"frames": found["n"], **kept}
 
 
 def calibration(watched: Watched) -> list[dict[str, Any]]:

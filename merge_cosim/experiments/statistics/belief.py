@@ -30,7 +30,8 @@ def belief(rows: pa.Table) -> pd.DataFrame:
             if len(known):
                 odds, lead = known[f"log_odds_{gate}"].to_numpy(), known[f"arrival_lead_{gate}"].to_numpy()
                 truth = (known["label"] == "NOT_YIELD").to_numpy()
-                found.append(key | {"start": start, "gate_m": gate, **scores(odds, truth), **_of_lead(lead, truth)})
+                scored = scores(odds, truth) | {"auc_arrival": auc(lead, truth)}
+                found.append(key | {"start": start, "gate_m": gate} | scored)
     return pd.DataFrame(found)
 
 
@@ -59,7 +60,7 @@ def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
         log_odds: `log P(NOT_YIELD) - log P(YIELD)`, shape (n,), n > 0.
         truth: The label is NOT_YIELD, shape (n,).
     """
-    from sklearn.metrics import brier_score_loss, roc_auc_score
+    from sklearn.metrics import brier_score_loss
 
     found: dict[str, Any] = {
         "n": len(truth),
@@ -75,16 +76,15 @@ def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
     found["brier"] = round(float(brier_score_loss(truth, probability)), 6)
     found["log_loss"] = round(surprise, 6) if np.isfinite(surprise) else None
     found["calibration_error"] = round(sum(errors) / len(truth), 6)
-    if 0 < truth.sum() < len(truth):
-        found["auc"] = round(float(roc_auc_score(truth, probability)), 6)
+    found["auc"] = auc(log_odds, truth)
     return found
 
 
-def _of_lead(lead: FloatArray, truth: BoolArray) -> dict[str, float | None]:
+def auc(score: FloatArray, truth: BoolArray) -> float | None:
+    """Area under the ROC curve of a score for NOT_YIELD; None where only one label occurs."""
     from sklearn.metrics import roc_auc_score
 
-    mixed = 0 < truth.sum() < len(truth)
-    return {"auc_arrival": round(float(roc_auc_score(truth, lead)), 6) if mixed else None}
+    return round(float(roc_auc_score(truth, np.nan_to_num(score))), 6) if 0 < truth.sum() < len(truth) else None
 
 
 def _groups(rows: pa.Table) -> Iterator[tuple[dict[str, str], str, pd.DataFrame]]:
