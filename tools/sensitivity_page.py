@@ -3,7 +3,7 @@
     python tools/sensitivity_page.py [--data DIR]
 
 runs one `merge-cosim sweep` with a `--vary` per choice (about five minutes on two cores) and sets its summary out as
-tables, each row one value, each column one method.
+tables, each row one value, each column one method, with what they show put into words by rule.
 """
 
 import argparse
@@ -11,11 +11,15 @@ import shlex
 import subprocess
 import sys
 import tempfile
+import textwrap
+from itertools import combinations
 from pathlib import Path
 
 import pandas as pd
 
 METHODS = ("acc", "slot", "slot-time", "pgm", "always-go", "always-yield")
+RIVALS = ("acc", "slot", "slot-time", "pgm")
+"""The methods whose order matters; the others are bounds."""
 CHOICES = {
     "merging.ahead=clear,in-lane,any": "When the designed merging car takes the host to be ahead of it",
     "speed_limit=12,15,20,25,29,33": "Speed limit [m/s]: how fast a host drives that nobody hinders",
@@ -31,6 +35,8 @@ CHOICES = {
     "encounters.merge_point=car,site": "Station 0 at each logged lane change, or at the site's median",
     "encounters.rules.observed=causal,raw": "What is observed of the merging car's speed",
 }
+WEAK = 0.5
+"""Points below which a choice counts as one that hardly matters."""
 HEAD = """# Sensitivity to what the papers leave open
 
 Failure rate in per cent by method, for each choice by itself, everything else as in the scenario file. The value that
@@ -68,6 +74,7 @@ def main() -> None:
     source = "real NGSIM data (fragments and merging episodes)" if real else "the SYNTHETIC surrogate"
     command = " ".join(shlex.quote(word) for word in [*words, *(["--data", "DIR"] if real else []), "--out", "OUT"])
     parts = [HEAD.format(source=source, command=command.replace(" --", " \\\n    --"), out="OUT")]
+    parts.append(findings(rows))
     for choice, title in CHOICES.items():
         parts.append(section(rows, choice.partition("=")[0], title))
     arguments.page.write_text("\n".join(parts), encoding="utf-8")
@@ -96,6 +103,44 @@ def section(rows: pd.DataFrame, name: str, title: str) -> str:
             lines.append(f"| {shown} | " + " | ".join(table.loc[value, methods]) + " |")
         lines.append("")
     return "\n".join(lines)
+
+
+def findings(rows: pd.DataFrame) -> str:
+    """What the tables show: the order of the methods, what turns it round, and which choice moves the rates most."""
+    lines = ["## What it shows", ""]
+    for scenario, here in rows[rows["method"].isin(RIVALS)].groupby("scenario"):
+        rates = here.pivot(index="variation", columns="method", values="failure_pct")[list(RIVALS)]
+        default = rates.loc[""]
+        order = ", ".join(f"{method} {rate:.1f} %" for method, rate in default.sort_values(kind="stable").items())
+        lines.append(f"- **{scenario}**, with the defaults: {order}.")
+        varied = rates.drop(index="")
+        turned = [variation for variation, row in varied.iterrows() if reversed_pairs(default, row)]
+        lines.append(f"- The order of two methods is turned round by {grouped(turned) or 'no value at all'}.")
+        best = [variation for variation, row in varied.iterrows() if row["pgm"] < row.drop("pgm").min()]
+        lines.append(f"- `pgm` alone fails least, as the papers have it, with {grouped(best) or 'no value at all'}.")
+        name = varied.index.str.partition("=").get_level_values(0)
+        span = (varied.groupby(name).max() - varied.groupby(name).min()).max(axis=1).sort_values(ascending=False)
+        strong = ", ".join(f"`{choice}` {points:.1f}" for choice, points in span.head(3).items())
+        weak = ", ".join(f"`{choice}`" for choice in span.index[span < WEAK])
+        lines.append(
+            f"- What moves a method's rate most, in points between two of its values: {strong}."
+            + (f" Less than half a point: {weak}." if weak else "")
+        )
+    return "\n".join([*(textwrap.fill(line, 120, subsequent_indent="  ") for line in lines), ""])
+
+
+def reversed_pairs(one: pd.Series, other: pd.Series) -> bool:
+    """Whether some method fails more than another in the one, and less in the other."""
+    return any((one[a] - one[b]) * (other[a] - other[b]) < 0 for a, b in combinations(RIVALS, 2))
+
+
+def grouped(variations: list[str]) -> str:
+    """Variations in words, the values of each choice together."""
+    values: dict[str, list[str]] = {}
+    for variation in variations:
+        name, _, value = variation.partition("=")
+        values.setdefault(name, []).append(value)
+    return "; ".join(f"`{name}` {', '.join(of)}" for name, of in values.items())
 
 
 def cell(row: pd.Series) -> str:
