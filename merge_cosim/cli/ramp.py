@@ -89,18 +89,25 @@ def edit(which: Which) -> None:
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The new ramp's name.")],
     out: Annotated[Path, typer.Option("--out", help="Folder in which the ramp's folder is made.")],
+    lanes: Annotated[int, typer.Option(min=1, help="Main lanes.")] = 1,
+    ramp_lanes: Annotated[int, typer.Option(min=1, help="Lanes of the on-ramp.")] = 1,
+    acceleration_lane: Annotated[
+        float, typer.Option(min=0.0, help="Its length [m]; 0: the on-ramp and the host's lane go on as one.")
+    ] = 0.0,
     upstream: Annotated[float, typer.Option(min=1.0, help="Road and on-ramp before the gore [m].")] = 500.0,
     downstream: Annotated[float, typer.Option(min=1.0, help="Road after the gore [m].")] = 1500.0,
     speed_limit: Annotated[float, typer.Option(min=1.0, help="Speed limit [m/s].")] = 29.0,
+    lane_width: Annotated[float, typer.Option(min=2.0, help="Width of every lane [m].")] = 3.6,
     as_json: Json = False,
 ) -> None:
-    """Start a ramp of your own from a copy of the designed one."""
+    """Start a ramp of your own from a few numbers."""
     import json
 
     from merge_cosim.ramps.build import check
-    from merge_cosim.ramps.new import new_ramp
+    from merge_cosim.ramps.new import RampNumbers, new_ramp
 
-    folder = new_ramp(out / name, upstream, downstream, speed_limit)
+    numbers = RampNumbers(lanes, ramp_lanes, acceleration_lane, upstream, downstream, speed_limit, lane_width)
+    folder = new_ramp(out / name, numbers)
     problems = check(folder)
     if as_json:
         print(json.dumps({"folder": str(folder), "problems": problems}, indent=2))

@@ -124,4 +124,6 @@ def read_ramp_file(folder: Path) -> RampFile:
             known = [name for table in (RampFile, Extensions, NgsimMapping) for name in table.model_fields]
             near = get_close_matches(str(first["loc"][-1]), known, n=1)
             reason = f"unknown key; did you mean '{near[0]}'?" if near else "unknown key"
+        elif first["type"] == "missing":
+            reason = "missing; every ramp needs it"
         raise UserError(f"{path}: {key + ': ' if key else ''}{reason}") from None

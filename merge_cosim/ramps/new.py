@@ -1,77 +1,196 @@
-"""Start a ramp of one's own from a copy of the designed one."""
+"""Start a ramp of one's own from a few numbers: straight roads, built at once, to be edited further."""
 
+from __future__ import annotations
+
+import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
-
-from lxml import etree
 
 from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
 from merge_cosim.ramps.build import build
-from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
-from merge_cosim.ramps.view import copy_view
+from merge_cosim.ramps.definition import FILE_NAME
+from merge_cosim.ramps.view import ROLES, copy_view
 
 PATTERN = "designed"
-"""The shipped ramp that new ones are copied from."""
+"""The shipped ramp whose netconvert configuration and view new ones take over."""
+ANGLE = math.radians(5.0)
+"""Between on-ramp and main road."""
+HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 
-def new_ramp(folder: Path, upstream: float, downstream: float, speed_limit: float) -> Path:
-    """Copy the designed ramp into a new folder with other lengths and another speed limit, and build it.
+@dataclass(frozen=True)
+class RampNumbers:
+    """What a straight ramp is made of.
 
-    Args:
-        folder: The new folder; its name is the ramp's.
+    Attributes:
+        lanes: Main lanes; the host drives in the right-most.
+        ramp_lanes: Lanes of the on-ramp; more than one needs an acceleration lane.
+        acceleration_lane: How far the on-ramp's lanes go on beside the main road after the gore [m]; 0: none, the
+            on-ramp and the host's lane go on as one lane.
         upstream: Length of the main road and of the on-ramp before the gore [m].
         downstream: Length of the road after the gore [m].
         speed_limit: Speed limit [m/s].
+        lane_width: Width of every lane [m].
+    """
+
+    lanes: int = 1
+    ramp_lanes: int = 1
+    acceleration_lane: float = 0.0
+    upstream: float = 500.0
+    downstream: float = 1500.0
+    speed_limit: float = 29.0
+    lane_width: float = 3.6
+
+    @property
+    def merging_point(self) -> float:
+        """Default merging point [m past the gore]: a fifth of the acceleration lane, about as on US-101."""
+        return float(round(self.acceleration_lane / 5))
+
+
+def new_ramp(folder: Path, numbers: RampNumbers) -> Path:
+    """Write the plain XML and the definition of a ramp into a new folder, and build it.
 
     Raises:
-        UserError: The folder exists and is not empty, or its name is no plain word.
+        UserError: The folder exists and is not empty, its name is no plain word, or the numbers make no ramp.
     """
     name = folder.name
     if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
         raise UserError(f"{folder}: '{name}' is no name for a ramp; use letters, digits, '-' and '_'")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UserError(f"{folder}: exists already; choose another name or folder")
-    source = shipped("sumo_nets") / PATTERN
-    old = read_ramp_file(source)
-    stretch = {"before": upstream / old.lengths["main_in"], "after": downstream / old.lengths["main_out"]}
+    if numbers.ramp_lanes > 1 and not numbers.acceleration_lane:
+        raise UserError(f"{folder}: {numbers.ramp_lanes} ramp lanes cannot end in one lane; give --acceleration-lane")
+    if numbers.acceleration_lane >= numbers.downstream:
+        raise UserError(f"{folder}: the acceleration lane is as long as the road; make --downstream longer")
     folder.mkdir(parents=True, exist_ok=True)
-    for path in source.glob(f"{PATTERN}.*"):
-        target = folder / path.name.replace(PATTERN, name)
-        if path.suffixes[-2:] in ([".nod", ".xml"], [".edg", ".xml"]):
-            target.write_bytes(_resized(path, stretch, speed_limit))
-        elif path.suffixes[-2:] != [".net", ".xml"]:
-            target.write_text(path.read_text(encoding="utf-8").replace(PATTERN, name), encoding="utf-8")
-    copy_view(source, folder)
-    values = {
-        "title": f'"{name}"',
-        "net": f'"{name}.net.xml"',
-        "speed_limit": f"{speed_limit}",
-        "main_in": f"{upstream}",
-        "ramp": f"{upstream}",
-        "main_out": f"{downstream}",
+    source = shipped("sumo_nets") / PATTERN
+    settings = (source / f"{PATTERN}.netccfg").read_text(encoding="utf-8")
+    files = {
+        f"{name}.nod.xml": _nodes(numbers),
+        f"{name}.edg.xml": _edges(numbers),
+        f"{name}.con.xml": _connections(numbers),
+        f"{name}.netccfg": settings.replace(PATTERN, name),
+        FILE_NAME: _definition(name, numbers),
     }
-    text, _ = (source / FILE_NAME).read_text(encoding="utf-8").split("[sources]")
-    for key, value in values.items():
-        text = re.sub(rf'^{key} = ("[^"]*"|[\d.]+)', f"{key} = {value}", text, flags=re.MULTILINE)
-    origin = f'geometry = "Copied from the ramp {PATTERN} with other lengths."\n'
-    (folder / FILE_NAME).write_text(f"{text}[sources]\n{origin}", encoding="utf-8")
+    for file, text in files.items():
+        (folder / file).write_text(text, encoding="utf-8")
+    copy_view(source, folder)
     build(folder)
     return folder
 
 
-def _resized(path: Path, stretch: dict[str, float], speed_limit: float) -> bytes:
-    """A node or edge file with everything before and after the gore, which lies at (0, 0), scaled by a factor each."""
-    tree = etree.parse(path)
-    for element in tree.iter("node", "edge"):
-        part = "after" if element.get("from") == "gore" or element.get("id") == "main_end" else "before"
-        for key, value in element.items():
-            text = str(value)
-            if key in ("x", "y", "length"):
-                element.set(key, f"{float(text) * stretch[part]:.2f}")
-            elif key == "speed":
-                element.set(key, f"{speed_limit:.2f}")
-            elif key == "shape" and element.tag == "edge":
-                points = ([float(number) * stretch[part] for number in point.split(",")] for point in text.split())
-                element.set(key, " ".join(f"{x:.2f},{y:.2f}" for x, y in points))
-    return etree.tostring(tree, xml_declaration=True, encoding="UTF-8")
+def _nodes(n: RampNumbers) -> str:
+    left, right = (n.lanes - 0.5) * n.lane_width, -0.5 * n.lane_width
+    beside = right - n.ramp_lanes * n.lane_width if n.acceleration_lane else right
+    axis = (n.lanes - 1) / 2 * n.lane_width
+    x, y = _ramp_start(n)
+    # An acceleration lane's end and a lane that goes on as one: SUMO's own drivers let each other in by turns.
+    kind = "unregulated" if n.acceleration_lane else "zipper"
+    joints = [("gore", 0.0, kind)] + ([("lane_end", n.acceleration_lane, "unregulated")] if n.acceleration_lane else [])
+    rows = [f'<node id="main_start" x="{-n.upstream:.2f}" y="{axis:.2f}" type="dead_end"/>']
+    rows.append(f'<node id="ramp_start" x="{x:.2f}" y="{y:.2f}" type="dead_end"/>')
+    for name, at, type_ in joints:
+        corners = ((at - 1, beside), (at - 1, left), (at + 1, left), (at + 1, beside))
+        shape = " ".join(f"{a:.2f},{b:.2f}" for a, b in corners)
+        rows.append(f'<node id="{name}" x="{at:.2f}" y="0.00" type="{type_}" radius="1" shape="{shape}"/>')
+    rows.append(f'<node id="main_end" x="{n.downstream:.2f}" y="{axis:.2f}" type="dead_end"/>')
+    return _document(
+        "nodes",
+        "Metres; x runs along the road and is 0 at the gore, y is 0 on the axis of the host lane. Joining nodes carry "
+        "a shape 2 m long, because netconvert stretches its own at shallow angles.",
+        rows,
+    )
+
+
+def _edges(n: RampNumbers) -> str:
+    axis = (n.lanes - 1) / 2 * n.lane_width
+    main = ["host", *["main"] * (n.lanes - 1)]
+    end = n.acceleration_lane
+    onward = "lane_end" if end else "gore"
+    rows = _edge(n, "main_in", "main_start", "gore", [(-n.upstream, axis), (0.0, axis)], main)
+    rows += _edge(n, "ramp", "ramp_start", "gore", [_ramp_start(n), (0.0, _ramp_end(n))], ["ramp"] * n.ramp_lanes)
+    if end:
+        middle = axis - n.ramp_lanes * n.lane_width / 2
+        lanes = ["auxiliary"] * n.ramp_lanes + main
+        rows += _edge(n, "merge", "gore", "lane_end", [(0.0, middle), (end, middle)], lanes)
+    rows += _edge(n, "main_out", onward, "main_end", [(end, axis), (n.downstream, axis)], main)
+    return _document(
+        "edges",
+        "Each shape is the axis of its edge (spreadType center); length is what SUMO drives and equals the distance "
+        "along the axis, node to node.",
+        rows,
+    )
+
+
+def _edge(
+    n: RampNumbers, name: str, start: str, end: str, axis: list[tuple[float, float]], roles: list[str]
+) -> list[str]:
+    shape = " ".join(f"{x:.2f},{y + 0.0:.2f}" for x, y in axis)
+    rows = [
+        f'<edge id="{name}" from="{start}" to="{end}" numLanes="{len(roles)}" speed="{n.speed_limit:.2f}" '
+        f'width="{n.lane_width:.2f}" spreadType="center" length="{math.dist(*axis):.2f}" shape="{shape}">'
+    ]
+    for index, role in enumerate(roles):
+        rows.append(f'    <lane index="{index}"><param key="role" value="{ROLES[role]}"/></lane>')
+    return [*rows, "</edge>"]
+
+
+def _connections(n: RampNumbers) -> str:
+    links = []
+    if n.acceleration_lane:
+        links += [("main_in", lane, "merge", lane + n.ramp_lanes) for lane in range(n.lanes)]
+        links += [("ramp", lane, "merge", lane) for lane in range(n.ramp_lanes)]
+        links += [("merge", lane + n.ramp_lanes, "main_out", lane) for lane in range(n.lanes)]
+    else:
+        links += [("main_in", lane, "main_out", lane) for lane in range(n.lanes)] + [("ramp", 0, "main_out", 0)]
+    rows = [
+        f'<connection from="{start}" fromLane="{lane}" to="{end}" toLane="{onto}"/>' for start, lane, end, onto in links
+    ]
+    return _document("connections", "Every connection there is: lane 0 is the right-most lane.", rows)
+
+
+def _ramp_end(n: RampNumbers) -> float:
+    """Y where the on-ramp's axis reaches the gore [m]."""
+    return -(n.ramp_lanes + 1) / 2 * n.lane_width if n.acceleration_lane else 0.0
+
+
+def _ramp_start(n: RampNumbers) -> tuple[float, float]:
+    return -n.upstream * math.cos(ANGLE), _ramp_end(n) - n.upstream * math.sin(ANGLE)
+
+
+def _document(root: str, comment: str, rows: list[str]) -> str:
+    lines = [f"<{root}>", f"    <!-- {comment} -->", *(f"    {row}" for row in rows), f"</{root}>"]
+    return HEAD + "\n".join(lines) + "\n"
+
+
+def _definition(name: str, n: RampNumbers) -> str:
+    """Contents of `ramp.toml`."""
+    lengths = {"main_in": n.upstream, "ramp": n.upstream}
+    if n.acceleration_lane:
+        lengths["merge"] = n.acceleration_lane
+        main, host = '"main_in", "merge", "main_out"', f"0, {n.ramp_lanes}, 0"
+        ramp, merging, gore = '"ramp", "merge"', f"{n.ramp_lanes - 1}, {n.ramp_lanes - 1}", "merge"
+    else:
+        main, host, ramp, merging, gore = '"main_in", "main_out"', "0, 0", '"ramp"', "0", "main_out"
+    lengths["main_out"] = n.downstream - n.acceleration_lane
+    rows = [
+        f'title = "{name}"',
+        f'net = "{name}.net.xml"',
+        "",
+        f"main = [{main}]",
+        f"host_lane = [{host}]   # SUMO counts from the right",
+        f"ramp = [{ramp}]",
+        f"merging_lane = [{merging}]",
+        f'gore = "{gore}"   # x = 0 at the start of this edge',
+        f"merging_point = {n.merging_point}   # m past the gore",
+        f"speed_limit = {n.speed_limit}   # m/s",
+        "",
+        "[lengths]   # m",
+        *(f"{edge} = {length}" for edge, length in lengths.items()),
+        "",
+        "[sources]",
+        'geometry = "Designed: straight roads made by merge-cosim ramp new."',
+    ]
+    return "\n".join(rows) + "\n"

@@ -5,6 +5,9 @@ from pathlib import Path
 
 FILE_NAME = "view.xml"
 
+ROLES = {"main": 0, "host": 1, "auxiliary": 2, "ramp": 3, "exit": 4}
+"""Values of a lane's parameter `role`, by which `view.xml` colours it."""
+
 _BY_LANE_PARAMETER = {"sumo-gui": 32, "netedit": 13}
 """Either program's number (SUMO 1.28) for the colours `by param (numerical, lanewise)`."""
 

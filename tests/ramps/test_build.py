@@ -34,6 +34,8 @@ def test_shipped_ramps_have_no_problem(name: str) -> None:
         ("weave = 213.0\n", "", "lengths.weave: missing"),
         ("merging_point = 42.0", "merging_point = 180.0", "33 m of auxiliary lane after it, but 53 m to brake in"),
         ('"weave_0"', '"weave_9"', "ngsim.lanes.6: the net us101.net.xml has no lane 'weave_9'"),
+        ("speed_limit = 29.0", "", "speed_limit: missing; every ramp needs it"),
+        ('["main_in", "weave", "main_out"]', '["weave", "main_in", "main_out"]', "gore must be an edge of main after"),
         ("title", "titel", "titel: unknown key; did you mean 'title'?"),
         ('"us101.net.xml"', '"other.net.xml"', "other.net.xml: no such net"),
     ],

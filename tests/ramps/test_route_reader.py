@@ -5,7 +5,7 @@ import pytest
 
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
-from merge_cosim.ramps.new import new_ramp
+from merge_cosim.ramps.new import RampNumbers, new_ramp
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.route_reader import read_sumocfg
 from merge_cosim.ramps.routes import write_encounter
@@ -27,7 +27,7 @@ CONFIG = """<configuration>
 
 
 def write(folder, routes=ROUTES, config=CONFIG):
-    ramp = new_ramp(folder / "mine", 500.0, 1500.0, 29.0)
+    ramp = new_ramp(folder / "mine", RampNumbers())
     (folder / "my.rou.xml").write_text(routes)
     file = folder / "my.sumocfg"
     file.write_text(config.replace("designed.net.xml", Ramp.load(ramp).net.name))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sumolib
 from geometry.lines import SURVEY_FOOT
-from geometry.plain_xml import ROLES, write_sources
+from geometry.plain_xml import write_sources
 from geometry.positions import positions
 from geometry.residuals import judge
 from geometry.sites import TIES
@@ -18,6 +18,7 @@ from ramp_geometry import NETS, fitted, plan_of
 
 from merge_cosim.ramps.definition import read_ramp_file
 from merge_cosim.ramps.ramp import Ramp, read_net
+from merge_cosim.ramps.view import ROLES
 from merge_cosim.units import FOOT
 
 SITES = ("us101", "i80")

@@ -8,11 +8,10 @@ import numpy as np
 
 from geometry.lines import FloatArray
 from geometry.plan import Edge, Plan
+from merge_cosim.ramps.view import ROLES
 
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 MADE = "    <!-- Written by tools/ramp_geometry.py from the survey in docs/geometry.md. "
-ROLES = {"main": 0, "host": 1, "auxiliary": 2, "ramp": 3, "exit": 4}
-"""Values of the lanes' parameter `role`, by which `view.xml` colours them."""
 JOINT = 1.0
 """Half the length of a node's shape along the road [m]."""
 
