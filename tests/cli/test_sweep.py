@@ -131,6 +131,7 @@ def interrupt(tmp_path, sent, *arguments):
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
     )
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob("out/parts/*.parquet")) and time.monotonic() < deadline:
