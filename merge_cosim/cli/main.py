@@ -7,7 +7,8 @@ from typing import Annotated, Literal, cast
 
 import typer
 
-from merge_cosim.cli import ngsim, ramp
+from merge_cosim.cli import lists, ngsim, ramp, results
+from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Model, Plugins, Seed, Sets
 from merge_cosim.cli.show import die, print_json, show_table
 from merge_cosim.errors import UserError
 
@@ -18,6 +19,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+app.add_typer(results.app)
+app.add_typer(lists.app)
 app.add_typer(ngsim.app, name="ngsim")
 app.add_typer(ramp.app, name="ramp")
 
@@ -30,17 +33,7 @@ SHOWN = (
 USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 """typer's UsageError; typer gives it no public name."""
 
-Source = Literal["ngsim", "surrogate"]
 Start = Literal["spawn", "fork"]
-Data = Annotated[Path | None, typer.Option(help="Folder with NGSIM files (else $MERGE_COSIM_DATA, else ./data).")]
-Model = Annotated[str | None, typer.Option(help="Model file, or name of a model that comes with the project.")]
-Sets = Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, such as acc.headway=1.2 or test.horizon=5.")]
-Plugins = Annotated[list[Path] | None, typer.Option(help="Python file with components of your own.")]
-Against = Annotated[
-    str | None, typer.Option(help="Method to compare the others with on the same cases; pgm if it was run.")
-]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
-Seed = Annotated[int, typer.Option(help="Seed of SUMO and of every random stream.")]
 
 
 @app.command()
@@ -53,12 +46,12 @@ def sweep(
     set_: Sets = None,
     vary: Annotated[list[str] | None, typer.Option(help="NAME=A:B:STEP or NAME=X,Y,Z; one at a time.")] = None,
     data: Data = None,
-    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    source: ForceSource = None,
     seed: Seed = 0,
     plugin: Plugins = None,
     against: Against = None,
     out: Annotated[Path, typer.Option(help="Result folder.")] = Path("out"),
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
+    jobs: Jobs = None,
     start: Annotated[Start, typer.Option(help="How processes are started.")] = "spawn",
     dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to run on, or 'local'.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Finish an interrupted sweep.")] = False,
@@ -67,7 +60,7 @@ def sweep(
     """Run scenarios under methods and store one row per case."""
     import os
 
-    from merge_cosim.cli.progress import sweep_progress
+    from merge_cosim.cli.progress import resumable, sweep_progress
     from merge_cosim.experiments.methods import parse_setting, parse_variation
     from merge_cosim.experiments.plan import SweepRequest
     from merge_cosim.experiments.sweep import sweep as run_sweep
@@ -88,12 +81,9 @@ def sweep(
         dask=dask,
         against=against,
     )
-    try:
-        with sweep_progress() as progress:
-            run_sweep(request, out, resume, progress)
-    except KeyboardInterrupt:
-        typer.echo(f"interrupted: what was finished is kept in {out}; go on with --resume", err=True)
-        raise typer.Exit(130) from None
+    how = f"interrupted: what was finished is kept in {out}; go on with --resume"
+    with resumable(how), sweep_progress() as progress:
+        run_sweep(request, out, resume, progress)
     from merge_cosim.experiments.store import MANIFEST, SUMMARY_JSON, ResultFolder
 
     folder = ResultFolder(out)
@@ -112,7 +102,7 @@ def run(
     model: Model = None,
     set_: Sets = None,
     data: Data = None,
-    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    source: ForceSource = None,
     seed: Seed = 0,
     plugin: Plugins = None,
     gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui.")] = False,
@@ -151,7 +141,7 @@ def export(
     out: Annotated[Path, typer.Option(help="Folder to write to.")],
     set_: Sets = None,
     data: Data = None,
-    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    source: ForceSource = None,
     json: Json = False,
 ) -> None:
     """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us."""
@@ -174,7 +164,7 @@ def train(
     out: Annotated[Path, typer.Option(help="Model file to write (.json).")],
     data: Data = None,
     site: Annotated[Literal["us101", "i80"], typer.Option(help="Site to train on.")] = "us101",
-    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
+    source: ForceSource = None,
     split: Annotated[Literal["car", "pair"], typer.Option(help="What is kept together on one side.")] = "car",
     seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
     json: Json = False,
@@ -192,123 +182,6 @@ def train(
         )
         show_table(report["held_out"], "held-out merging cars, by distance to the merging point")
         show_table(report["densities"], "-log P(V_t | V_t-1, I) per transition of held-out cars; less is better")
-
-
-@app.command()
-def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
-    against: Against = None,
-    json: Json = False,
-) -> None:
-    """Make one offline HTML page of a sweep: tables, failure maps, one case in detail."""
-    from merge_cosim.report.page import write_report
-
-    file = write_report(folder, against)
-    if json:
-        print_json({"report": str(file)})
-    else:
-        typer.echo(file)
-
-
-@app.command()
-def bench(
-    cases: Annotated[int, typer.Option(min=1, help="Cases that our loop runs.")] = 2_000,
-    sample: Annotated[int, typer.Option(min=1, help="Of them, how many each alternative runs.")] = 100,
-    rounds: Annotated[int, typer.Option(min=1, help="How often each is timed; the median counts.")] = 5,
-    largest: Annotated[int, typer.Option(min=1, help="Cases of the largest sweep.")] = 100_000,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
-    page: Annotated[Path | None, typer.Option(help="Write the figures as a page in Markdown, too.")] = None,
-    json: Json = False,
-) -> None:
-    """Time the loop, its alternatives, every estimator, and sweeps by cases and processes."""
-    from merge_cosim.bench import bench as figures
-
-    found = figures.bench(cases, sample, rounds, largest, jobs)
-    command = f"merge-cosim bench --cases {cases} --sample {sample} --rounds {rounds} --largest {largest}"
-    if page is not None:
-        figures.write_page(page, found, command)
-    if json:
-        print_json(found)
-    else:
-        typer.echo(figures.page(found, command))
-
-
-@app.command()
-def bounds(
-    scenario: Annotated[str, typer.Argument(help="Replay scenario, or its file.")],
-    set_: Sets = None,
-    data: Data = None,
-    source: Annotated[Source | None, typer.Option(help="Force real data or the surrogate.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Write one row per case to this .csv file.")] = None,
-    json: Json = False,
-) -> None:
-    """Count the cases of a replay that no host could pass without a failure, or not without a long delay."""
-    from merge_cosim.experiments.bounds import bounds_of
-    from merge_cosim.experiments.methods import parse_setting
-    from merge_cosim.ngsim.data import find_data
-
-    cases, rows = bounds_of(scenario, dict(map(parse_setting, set_ or ())), find_data(data), source)
-    if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        cases.to_csv(out, index=False)
-    if json:
-        print_json(rows)
-    else:
-        show_table(rows, f"{scenario}: what any host could have done")
-
-
-@app.command()
-def methods(plugin: Plugins = None, json: Json = False) -> None:
-    """List estimators, controllers and merging cars with their parameters."""
-    from merge_cosim.experiments.catalogue import components
-
-    rows = components(plugin or ())
-    if json:
-        print_json(rows)
-    else:
-        show_table(
-            [{k: v for k, v in row.items() if k != "parameters"} | {"parameters": _listed(row)} for row in rows], ""
-        )
-
-
-@app.command()
-def scenarios(json: Json = False) -> None:
-    """List the shipped scenarios."""
-    from merge_cosim.experiments.scenario import load_scenario, scenario_names
-
-    rows = [load_scenario(name) for name in scenario_names()]
-    listed = [{"scenario": one.name, "title": one.title, "ramp": one.ramp, "about": one.about.strip()} for one in rows]
-    if json:
-        print_json(listed)
-    else:
-        show_table(listed, "")
-
-
-@app.command()
-def cache(clear: Annotated[bool, typer.Option("--clear", help="Delete it.")] = False, json: Json = False) -> None:
-    """Show what is kept of generated data, and where."""
-    import shutil
-
-    from merge_cosim.files import cache_folder
-
-    folder = cache_folder()
-    rows = []
-    for part in sorted(path for path in folder.iterdir() if path.is_dir()):
-        files = [file for file in part.rglob("*") if file.is_file()]
-        rows.append(
-            {"part": part.name, "files": len(files), "mib": round(sum(f.stat().st_size for f in files) / 2**20, 2)}
-        )
-        if clear:
-            shutil.rmtree(part)
-    if json:
-        print_json({"folder": str(folder), "cleared": clear, "parts": rows})
-    else:
-        show_table(rows, f"{folder}{' (cleared)' if clear else ''}")
-
-
-def _listed(row: dict[str, object]) -> str:
-    values = row["parameters"]
-    return ", ".join(f"{key}={value}" for key, value in values.items()) if isinstance(values, dict) else ""
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""A progress bar on standard error."""
+"""A progress bar on standard error, and what an interrupt says."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,3 +20,15 @@ def sweep_progress() -> Iterator[Callable[[int, int, str], None]]:
             bar.update(task, completed=done, total=total, description=what, refresh=True)
 
         yield show
+
+
+@contextmanager
+def resumable(message: str) -> Iterator[None]:
+    """On Ctrl-C say how to go on, and end with status 130."""
+    import typer
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo(message, err=True)
+        raise typer.Exit(130) from None

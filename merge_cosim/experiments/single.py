@@ -72,6 +72,23 @@ def trace_case(batch: Batch, gui_delay: int | None = None) -> tuple[dict[str, An
     return rows_of(batch, run, ramp).to_pylist()[0], pd.DataFrame(run.traces[0])
 
 
+def trace_methods(request: SweepRequest, case: str) -> tuple[pd.DataFrame, dict[str, bool]]:
+    """Run one case of one scenario under all of the request's methods.
+
+    Returns:
+        Records of all methods, one row per cycle, with the column `method`; and whether each failed.
+
+    Raises:
+        UserError: There is no such case.
+    """
+    records, failed = [], {}
+    for batch in plan(request):
+        row, record = trace_case(_case_alone([batch], case))
+        records.append(record.assign(method=batch.method.name))
+        failed[batch.method.name] = bool(row["failed"])
+    return pd.concat(records, ignore_index=True), failed
+
+
 def export_case(request: SweepRequest, case: str, out: Path) -> Path:
     """Write one case of one scenario as SUMO files into a folder; returns the `.sumocfg`."""
     batch = _case_alone(plan(request), case)

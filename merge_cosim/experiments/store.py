@@ -75,6 +75,13 @@ class ResultFolder:
         self._parts.mkdir(parents=True, exist_ok=True)
         _write_text(self._plan, json.dumps(plan, indent=1))
 
+    def holds(self, plan: dict[str, Any]) -> bool:
+        """Whether a finished sweep of this plan is here."""
+        if self._plan.is_file() or not (self.path / MANIFEST).is_file():
+            return False
+        manifest = self.read_json(MANIFEST)
+        return all(manifest.get(key) == value for key, value in json.loads(json.dumps(plan)).items())
+
     def done(self) -> set[str]:
         """Names of the batches whose parts are there."""
         return {file.stem for file in self._parts.glob("*.parquet")}

@@ -47,8 +47,17 @@ class _Tally:
         self.by_method.setdefault(method, Effort()).add(effort)
 
 
-def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Progress | None = None) -> dict[str, Any]:
+def sweep(
+    request: SweepRequest, out: Path, resume: bool = False, progress: Progress | None = None, reuse: bool = False
+) -> dict[str, Any]:
     """Run a sweep and write its result folder; returns the manifest.
+
+    Args:
+        request: What to run.
+        out: Result folder.
+        resume: Finish an interrupted sweep.
+        progress: Told how far it is.
+        reuse: Leave a finished sweep of the same plan as it is.
 
     Raises:
         UserError: See `plan` and `ResultFolder.begin`.
@@ -57,6 +66,9 @@ def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Prog
     batches = plan(request)
     folder = ResultFolder(out)
     what = identity(request, batches)
+    if reuse and folder.holds(what):
+        manifest: dict[str, Any] = folder.read_json(MANIFEST)
+        return manifest
     folder.begin(what, resume)
     planned = perf_counter()
     tally = _run(request, list(cut(batches)), folder, progress)

@@ -21,12 +21,14 @@ class Column:
         heading: Short heading with its unit.
         decimals: Digits after the point; None for text.
         group: Heading above several neighbouring columns.
+        prose: Sentences, set to the left and wrapped.
     """
 
     name: str
     heading: str
     decimals: int | None = None
     group: str = ""
+    prose: bool = False
 
     def text(self, value: Any) -> str:
         """Write one value."""
@@ -83,7 +85,8 @@ class Table:
         frame = pd.DataFrame(self.cells, columns=keys).replace(MISSING, "--")
         if not any(column.group for column in self.columns):
             frame.columns = keys.get_level_values(1)
-        form = "".join("l" if column.decimals is None else "r" for column in self.columns)
+        forms = {True: "p{0.3\\textwidth}", False: "l"}
+        form = "".join(forms[column.prose] if column.decimals is None else "r" for column in self.columns)
         caption = self.title.replace("_", r"\_")
         text: str = frame.to_latex(
             index=False, escape=True, column_format=form, multicolumn_format="c", caption=caption

@@ -59,6 +59,16 @@ PUBLISHED: dict[str, dict[str, Figure]] = {
 }
 """By scenario and method. Designed Test I is published over both sites together."""
 
+CYCLE_MS = {"acc": 0.05, "ipcb": 0.20, "pgm-g": 0.51, "pgm": 0.08, "fg-gmm": 0.08}
+"""Published mean time per cycle [ms]."""
+
+VALIDITY = {
+    "us101-replay": {"pgm-g": 20.0, "fg": 13.0, "fg-gmm": 6.0},
+    "i80-replay": {"pgm-g": 23.0, "fg": 14.0, "fg-gmm": 7.0},
+}
+"""Published failure rates [%] of the validity test, 100 pairs each (Lyu, Dong, Dolan 2020, Table II): US-101
+07:50-08:05, I-80 05:15-05:30 pm."""
+
 
 @dataclass(frozen=True)
 class Component:

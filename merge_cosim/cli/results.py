@@ -1,0 +1,124 @@
+"""`merge-cosim report`, `compare`, `reproduce`, `bounds` and `bench`: what results and runs amount to."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Seed, Sets
+from merge_cosim.cli.show import print_json, show_table
+
+app = typer.Typer()
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
+    against: Against = None,
+    json: Json = False,
+) -> None:
+    """Make one offline HTML page of a sweep: tables, failure maps, one case in detail."""
+    from merge_cosim.report.page import write_report
+
+    file = write_report(folder, against)
+    if json:
+        print_json({"report": str(file)})
+    else:
+        typer.echo(file)
+
+
+@app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep: A.")],
+    second: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of another sweep: B.")],
+    out: Annotated[Path | None, typer.Option(help="Folder for the table as CSV and LaTeX.")] = None,
+    json: Json = False,
+) -> None:
+    """Set two sweeps side by side, on the cases that both hold."""
+    from merge_cosim.report.comparison import compare as compare_folders
+    from merge_cosim.report.export import write_tables
+
+    table, differences = compare_folders(first, second)
+    files = [] if out is None else write_tables(out, {"comparison": table})
+    if json:
+        rows = table.data.astype(object).where(table.data.notna(), None).to_dict("records")
+        print_json({"rows": rows, "differences": differences, "files": [str(file) for file in files]})
+        return
+    headings = [" ".join(filter(None, (column.group, column.heading))) for column in table.columns]
+    show_table([dict(zip(headings, row, strict=True)) for row in table.cells], table.title)
+    for line in differences:
+        typer.echo(line)
+
+
+@app.command()
+def reproduce(
+    data: Data = None,
+    out: Annotated[Path, typer.Option(help="Folder for results, models, tables and the page.")] = Path("reproduction"),
+    jobs: Jobs = None,
+    seed: Seed = 0,
+    json: Json = False,
+) -> None:
+    """Run every table and figure of the papers, ours beside theirs, into one HTML page; a second call goes on."""
+    import os
+
+    from merge_cosim.cli.progress import resumable, sweep_progress
+    from merge_cosim.experiments.reproduction import reproduce as run_studies
+    from merge_cosim.ngsim.data import find_data
+    from merge_cosim.report.papers.page import write_reproduction
+
+    found = find_data(data)
+    how = f"interrupted: what was finished is kept in {out}; the same command goes on"
+    with resumable(how), sweep_progress() as progress:
+        studies = run_studies(found, out, jobs or os.cpu_count() or 1, seed, progress)
+        file = write_reproduction(studies, out, progress)
+    if json:
+        print_json({"report": str(file), "studies": {study.name: str(out / study.name) for study in studies}})
+    else:
+        typer.echo(file)
+
+
+@app.command()
+def bounds(
+    scenario: Annotated[str, typer.Argument(help="Replay scenario, or its file.")],
+    set_: Sets = None,
+    data: Data = None,
+    source: ForceSource = None,
+    out: Annotated[Path | None, typer.Option(help="Write one row per case to this .csv file.")] = None,
+    json: Json = False,
+) -> None:
+    """Count the cases of a replay that no host could pass without a failure, or not without a long delay."""
+    from merge_cosim.experiments.bounds import bounds_of
+    from merge_cosim.experiments.methods import parse_setting
+    from merge_cosim.ngsim.data import find_data
+
+    cases, rows = bounds_of(scenario, dict(map(parse_setting, set_ or ())), find_data(data), source)
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        cases.to_csv(out, index=False)
+    if json:
+        print_json(rows)
+    else:
+        show_table(rows, f"{scenario}: what any host could have done")
+
+
+@app.command()
+def bench(
+    cases: Annotated[int, typer.Option(min=1, help="Cases that our loop runs.")] = 2_000,
+    sample: Annotated[int, typer.Option(min=1, help="Of them, how many each alternative runs.")] = 100,
+    rounds: Annotated[int, typer.Option(min=1, help="How often each is timed; the median counts.")] = 5,
+    largest: Annotated[int, typer.Option(min=1, help="Cases of the largest sweep.")] = 100_000,
+    jobs: Jobs = None,
+    page: Annotated[Path | None, typer.Option(help="Write the figures as a page in Markdown, too.")] = None,
+    json: Json = False,
+) -> None:
+    """Time the loop, its alternatives, every estimator, and sweeps by cases and processes."""
+    from merge_cosim.bench import bench as figures
+
+    found = figures.bench(cases, sample, rounds, largest, jobs)
+    command = f"merge-cosim bench --cases {cases} --sample {sample} --rounds {rounds} --largest {largest}"
+    if page is not None:
+        figures.write_page(page, found, command)
+    if json:
+        print_json(found)
+    else:
+        typer.echo(figures.page(found, command))

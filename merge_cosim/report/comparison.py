@@ -1,0 +1,94 @@
+"""Two result folders side by side: the same tests and methods, on the cases that both hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.statistics.comparison import mcnemar
+from merge_cosim.experiments.store import MANIFEST, ResultFolder
+from merge_cosim.report.columns import Column, Table
+from merge_cosim.report.methods import in_order, is_reference
+
+GROUP = ["scenario", "variation", "site", "source", "method"]
+MEASURES = {"distance_m": "D m", "delay_s": "delay s", "hardest_braking": "brake m/s²"}
+"""Measures whose means are set side by side, beside the failures."""
+
+
+def compare(first: Path, second: Path) -> tuple[Table, list[str]]:
+    """Set two result folders side by side.
+
+    Args:
+        first: Folder of a finished sweep (A).
+        second: Folder of another (B).
+
+    Returns:
+        One row per test and method that both hold, over their common cases; and what differs between the two sweeps.
+
+    Raises:
+        UserError: One of the folders holds no finished sweep, or they share no case.
+    """
+    folders = [ResultFolder(path) for path in (first, second)]
+    frames = [folder.results().to_pandas() for folder in folders]
+    both = frames[0].merge(frames[1], on=[*GROUP, "case"], suffixes=("_a", "_b"))
+    if both.empty:
+        raise UserError(f"{first} and {second}: they have no case of the same scenario and method in common")
+    rows = [
+        dict(zip(GROUP, key, strict=True)) | _row(part) for key, part in both.groupby(GROUP, sort=False, observed=True)
+    ]
+    data = pd.DataFrame(rows)
+    place = {method: i for i, method in enumerate(in_order(data["method"]))}
+    data = data.assign(place=data["method"].map(place)).sort_values([*GROUP[:4], "place"], ignore_index=True)
+    columns = [
+        *(Column(name, name) for name in GROUP if name in ("scenario", "method") or data[name].nunique() > 1),
+        Column("n", "n", 0, "common cases"),
+        *(Column(f"failure_pct_{side}", f"{side.upper()} %", 2, "failures") for side in "ab"),
+        *(Column(f"only_{side}", f"only {side.upper()}", 0, "failures") for side in "ab"),
+        Column("p", "McNemar p", 3, "failures"),
+        *(Column(f"{name}_{side}", side.upper(), 2, title) for name, title in MEASURES.items() for side in "ab"),
+    ]
+    title = f"A: {first}, B: {second}"
+    return Table.of(data, columns, list(map(is_reference, data["method"])), title), _differences(folders, frames)
+
+
+def _row(part: pd.DataFrame) -> dict[str, Any]:
+    scored = part[~part["censored_a"] & ~part["censored_b"]]
+    failed = [scored[f"failed_{side}"].to_numpy(dtype=bool) for side in "ab"]
+    only_a, only_b = (int((one & ~other).sum()) for one, other in (failed, failed[::-1]))
+    means = {f"{name}_{side}": part[f"{name}_{side}"].mean() for name in MEASURES for side in "ab"}
+    rates = {f"failure_pct_{side}": 100 * f.mean() if len(f) else np.nan for side, f in zip("ab", failed, strict=True)}
+    return {"n": len(scored), **rates, "only_a": only_a, "only_b": only_b, "p": mcnemar(only_a, only_b), **means}
+
+
+def _differences(folders: list[ResultFolder], frames: list[pd.DataFrame]) -> list[str]:
+    """What a reader must know before trusting the comparison, one line each."""
+    lines = []
+    manifests = [folder.read_json(MANIFEST) for folder in folders]
+    for name in ("versions", "seed", "models", "settings", "plugins", "scenarios"):
+        values = [manifest.get(name) for manifest in manifests]
+        if values[0] != values[1]:
+            lines.append(f"{name} differ: {_differing(values[0], values[1])}")
+    for folder, frame, other in zip(folders, frames, frames[::-1], strict=True):
+        mine, theirs = (set(one[["scenario", "method"]].itertuples(index=False, name=None)) for one in (frame, other))
+        alone = sorted(mine - theirs)
+        if alone:
+            lines.append(f"only in {folder.path}: " + ", ".join(f"{scenario} {method}" for scenario, method in alone))
+    return lines
+
+
+def _differing(one: Any, other: Any) -> str:
+    if not (isinstance(one, dict) and isinstance(other, dict)):
+        return f"{one} and {other}"
+    keys = sorted(key for key in {*one, *other} if one.get(key) != other.get(key))
+    return ", ".join(
+        f"{key} ({_short(one.get(key))} and {_short(other.get(key))})" if not isinstance(one.get(key), dict) else key
+        for key in keys
+    )
+
+
+def _short(value: Any) -> str:
+    return "none" if value is None else str(value)

@@ -1,0 +1,1 @@
+"""The papers' tables, figures and claims beside ours: what `merge-cosim reproduce` reports."""
