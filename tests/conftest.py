@@ -17,5 +17,7 @@ def data_dir() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Keep the user's cache out of the tests; one that is set already is kept, so that runs can share it."""
-    os.environ.setdefault("MERGE_COSIM_CACHE", str(tmp_path_factory.mktemp("cache")))
+    """Keep the user's cache out of the tests; all processes of a run share one, and one that is set already is kept."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    os.environ.setdefault("MERGE_COSIM_CACHE", str(shared / "cache"))

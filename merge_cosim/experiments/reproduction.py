@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,8 +45,6 @@ class Study:
 def reproduce(data: Path | None, out: Path, jobs: int, seed: int = 0, say: Say | None = None) -> list[Study]:
     """Train a model per source, run every study into a folder of its own, and return the studies.
 
-    A study that is finished is not run again; an interrupted one goes on.
-
     Args:
         data: Folder with NGSIM files, or None. The surrogate is run in any case.
         out: Folder to write to.
@@ -55,6 +53,12 @@ def reproduce(data: Path | None, out: Path, jobs: int, seed: int = 0, say: Say |
         say: Told what is going on.
     """
     found = studies(data, out, jobs, seed, say)
+    run(found, out, say)
+    return found
+
+
+def run(found: Sequence[Study], out: Path, say: Say | None = None) -> None:
+    """Run studies into folders of their own; a finished one is not run again, an interrupted one goes on."""
     for number, study in enumerate(found, start=1):
 
         def tell(done: int, total: int, what: str, lead: str = f"{number}/{len(found)} {study.name}") -> None:
@@ -62,7 +66,6 @@ def reproduce(data: Path | None, out: Path, jobs: int, seed: int = 0, say: Say |
                 say(done, total, f"{lead}: {what}")
 
         sweep(study.request, out / study.name, resume=True, progress=tell, reuse=True)
-    return found
 
 
 def studies(data: Path | None, out: Path, jobs: int, seed: int, say: Say | None = None) -> list[Study]:

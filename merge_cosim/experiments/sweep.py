@@ -132,6 +132,7 @@ def _sum_up(batches: Sequence[Batch], folder: ResultFolder, tally: _Tally, again
         parts[CALIBRATION_CSV].append(calibration(rows))
     tables = {name: pd.concat(found, ignore_index=True) for name, found in parts.items()}
     for name, table in tables.items():
+        (folder.path / name).unlink(missing_ok=True)
         if len(table):
             table.to_csv(folder.path / name, index=False)
     summary = tables[SUMMARY_CSV]

@@ -81,8 +81,10 @@ def gather(studies: Sequence[Study], out: Path) -> list[Evidence]:
 
 
 def _beliefs(folder: Path) -> pd.DataFrame:
+    if not (folder / BELIEF_CSV).is_file():  # no case of the study has a label
+        return pd.DataFrame()
     rows = pd.read_csv(folder / BELIEF_CSV, keep_default_na=False, na_values=[""])
-    return rows[(rows["start"] == ALL_STARTS) & (rows["variation"].fillna("") == "")]
+    return rows[(rows["start"] == ALL_STARTS) & rows["variation"].isna()]
 
 
 def _summary(folder: ResultFolder) -> pd.DataFrame:

@@ -1,0 +1,167 @@
+"""The reproduction of the papers on a small part of each test: real sweeps, one page, tables and verdicts."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from merge_cosim.experiments.reproduction import DESIGNED, NODE_SWEEP, PAIRS, Study, run, studies
+from merge_cosim.experiments.store import RESULTS
+from merge_cosim.experiments.sweep import SweepRequest
+from merge_cosim.report.papers import claims, tables
+from merge_cosim.report.papers.evidence import Evidence, gather
+from merge_cosim.report.papers.page import write_reproduction
+from merge_cosim.report.published import published
+
+METHODS = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg", "fg-gmm", "always-go", "human")
+COARSE = {f"encounters.{name}.step": 12 for name in ("host_speed", "merging_speed")} | {
+    "encounters.host_offset.step": 5
+}
+
+
+@pytest.fixture(scope="module")
+def small() -> list[Study]:
+    """A grid of few speeds, and one in ten of the surrogate's pairs (the model's training cars are not among them)."""
+    designed = SweepRequest(("designed-2",), METHODS, settings=COARSE)
+    pairs = SweepRequest(
+        ("us101-replay",), METHODS, "us101-surrogate", {"encounters.fraction": 0.9}, source="surrogate"
+    )
+    nodes = replace(pairs, methods=("pgm",), variations=[("pgm.nodes", (1, 52, 80))])
+    return [
+        Study(DESIGNED, DESIGNED, designed),
+        Study(PAIRS, "surrogate", pairs),
+        Study(NODE_SWEEP, "surrogate", nodes),
+    ]
+
+
+@pytest.fixture(scope="module")
+def reproduced(small: list[Study], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("reproduction")
+    run(small, out)
+    write_reproduction(small, out, lambda done, total, what: None)
+    return out
+
+
+@pytest.fixture(scope="module")
+def evidence(small: list[Study], reproduced: Path) -> Evidence:
+    (found,) = gather(small, reproduced)
+    return found
+
+
+def test_the_page_shows_every_part_offline(reproduced):
+    page = (reproduced / "report.html").read_text(encoding="utf-8")
+    for title in (
+        "Table I)",
+        "Table II; FG-GMM",
+        "Validity of FG",
+        "speed nodes",
+        "on camera",
+        "particle filter",
+        "Fig. 3",
+    ):
+        assert title in page
+    assert "SYNTHETIC" in page
+    assert not re.search(r'(src|href)="https?:', page)
+    for link in re.findall(r'href="([^"#]+)"', page):
+        assert (reproduced / link).is_file()
+    names = {file.stem for file in (reproduced / "tables").glob("*.csv")}
+    assert {
+        f"surrogate-{name}" for name in ("claims", "data-sets", "failures", "validity", "mixture", "nodes")
+    } <= names
+    assert names == {file.stem for file in (reproduced / "tables").glob("*.tex")}
+
+
+def test_ours_stand_beside_theirs(evidence):
+    table = tables.outcomes(evidence)["failures"].data.set_index("method")
+    rows = evidence.cases("designed-2")
+    for method in ("acc", "ipcb", "pgm"):
+        ours = 100 * rows.loc[rows["method"] == method, "failed"].mean()
+        assert table.loc[method, "designed-2_failure_pct"] == pytest.approx(ours, abs=1e-3)
+        assert table.loc[method, "designed-2_published"] == published("designed-2", method).failure_pct
+
+
+def test_finished_studies_are_not_run_again(small, reproduced):
+    before = (reproduced / DESIGNED / RESULTS).stat().st_mtime_ns
+    run(small[:1], reproduced)
+    assert (reproduced / DESIGNED / RESULTS).stat().st_mtime_ns == before
+
+
+def test_every_claim_gets_a_verdict_with_figures(evidence):
+    table = claims.claims_table(evidence).data
+    assert len(table) == len(claims.CLAIMS)
+    assert set(table["verdict"]) <= {claims.HOLDS, claims.FAILS, claims.OPEN}
+    assert table["evidence"].str.contains(r"\d|no I-80").all()
+
+
+def _with_rates(evidence: Evidence, rates: dict[str, float]) -> Evidence:
+    """The same evidence with other failure rates in every test."""
+    summary = evidence.summary.copy()
+    summary["failure_pct"] = summary["method"].map(rates).fillna(summary["failure_pct"])
+    return replace(evidence, summary=summary)
+
+
+@pytest.mark.parametrize(
+    ("pgm", "word"), [(0.5, claims.HOLDS), (1.0, claims.OPEN), (1.5, claims.FAILS)], ids=["lowest", "tie", "higher"]
+)
+def test_lowest_is_lower_than_all_others(evidence, pgm, word):
+    rates = {"acc": 3.0, "slot": 2.0, "ipcb": 1.0, "pgm-g": 1.0, "pgm": pgm}
+    assert claims.CLAIMS[0].judge(_with_rates(evidence, rates)).word == word
+
+
+def test_the_curve_over_nodes_needs_a_lowest_middle(evidence):
+    judge = claims.CLAIMS[2].judge
+    for values, word in (
+        ([3.0, 1.0, 2.0], claims.HOLDS),
+        ([1.0, 1.0, 1.0], claims.OPEN),
+        ([0.0, 1.0, 2.0], claims.FAILS),
+    ):
+        nodes = pd.DataFrame({"nodes": [1, 52, 80], "failure_pct": values})
+        assert judge(replace(evidence, nodes=nodes)).word == word
+
+
+def test_twice_as_often_is_counted(evidence):
+    rates = {"fg-gmm": 1.0, "acc": 2.1, "slot": 2.1, "ipcb": 2.1, "pgm-g": 2.1}
+    judge = claims.CLAIMS[6].judge
+    assert judge(_with_rates(evidence, rates)).word == claims.HOLDS
+    assert judge(_with_rates(evidence, rates | {"slot": 2.0})).word == claims.FAILS
+
+
+def test_discordant_cases(evidence):
+    rows = evidence.cases("designed-2").pivot(index="case", columns="method", values="failed").astype(bool)
+    go, ipcb = rows["always-go"].to_numpy(), rows["ipcb"].to_numpy()
+    found = evidence.discordant("designed-2", "always-go", "ipcb")
+    assert found[:2] == (np.sum(go & ~ipcb), np.sum(~go & ipcb))
+
+
+def test_the_studies_keep_sources_apart(tmp_path, data_dir):
+    found = studies(data_dir, tmp_path, jobs=1, seed=0)
+    assert [study.name for study in found] == [
+        "designed",
+        "pairs-surrogate",
+        "nodes-surrogate",
+        "pairs-ngsim",
+        "nodes-ngsim",
+    ]
+    real = found[3].request
+    assert real.source == "ngsim"
+    assert real.scenarios == ("us101-replay", "designed-1")
+    assert real.settings == {"encounters.sites": {"us101": "test"}}
+    assert (tmp_path / "models" / "us101-ngsim.json").is_file()
+
+
+def test_two_folders_side_by_side(reproduced: Path, command: Callable[..., int], capsys, tmp_path):
+    folders = (reproduced / "pairs-surrogate", reproduced / "nodes-surrogate")
+    assert command("compare", *folders, "--out", tmp_path) == 0
+    printed = capsys.readouterr().out
+    assert "pgm" in printed
+    assert "only in" in printed
+    table = pd.read_csv(tmp_path / "tables" / "comparison.csv")
+    assert (table["failure_pct_a"] == table["failure_pct_b"]).all()
+    assert (table[["only_a", "only_b"]] == 0).all(axis=None)
+    assert (table["p"] == 1.0).all()
+    assert command("compare", reproduced / "designed", folders[0]) == 2
+    assert "no case of the same scenario and method in common" in capsys.readouterr().err
