@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import expit
 from scipy.stats import bootstrap
-from test_summary import table
+from test_summaries import table
 
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.statistics import belief, calibration, strata, summarise
