@@ -2,8 +2,8 @@
 
     python tools/sensitivity_page.py [--data DIR]
 
-runs one `merge-cosim sweep` with a `--vary` per choice (about five minutes on two cores) and sets its summary out as
-tables, each row one value, each column one method, with what they show put into words by rule.
+runs one `merge-cosim sweep` with a `--vary` per choice (about a quarter of an hour on two cores), and sets its summary
+out as tables, each row one value, each column one method, with what they show put into words by rule.
 """
 
 import argparse
@@ -16,6 +16,12 @@ from itertools import combinations
 from pathlib import Path
 
 import pandas as pd
+
+from merge_cosim.control.base import controllers
+from merge_cosim.experiments.methods import parse_value
+from merge_cosim.experiments.scenario import load_scenario
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.registry import parameters
 
 METHODS = ("acc", "slot", "slot-time", "pgm", "always-go", "always-yield")
 RIVALS = ("acc", "slot", "slot-time", "pgm")
@@ -40,9 +46,10 @@ WEAK = 0.5
 HEAD = """# Sensitivity to what the papers leave open
 
 Failure rate in per cent by method, for each choice by itself, everything else as in the scenario file. The value that
-is the default stands in bold. `designed-2` is the grid of Dong, Dolan, Litkouhi 2017, 6,875 cases; `us101-replay` rests
-on {source}. In brackets: the share of hosts that never reached the merging point, where there are any; a method can
-trade the one for the other.
+is the default stands in bold. `designed-2` is the grid of Dong, Dolan, Litkouhi 2017; `us101-replay` rests on
+{source}.
+In brackets: the share of hosts that had not reached the merging point when the run ended, where there are any; a method
+can trade the one for the other. With `overlap_from=lane_change` a run is scored, and ends, sooner.
 
 Made by
 
@@ -91,18 +98,33 @@ def section(rows: pd.DataFrame, name: str, title: str) -> str:
         cells = varied.assign(cell=varied.apply(cell, axis=1), value=varied["variation"].str.partition("=")[2])
         table = cells.pivot(index="value", columns="method", values="cell").reindex(pd.unique(cells["value"]))
         methods = [method for method in METHODS if method in table]
-        same = [
-            all(row["failure_pct"] == default.loc[row["method"], "failure_pct"] for _, row in part.iterrows())
-            and all(row["delay_s"] == default.loc[row["method"], "delay_s"] for _, row in part.iterrows())
-            for _, part in ((value, cells[cells["value"] == value]) for value in table.index)
-        ]
         lines += [f"**{scenario}** (n = {int(default['n'].max())})", ""]
         lines += [f"| {name.rpartition('.')[2]} | " + " | ".join(methods) + " |", "|---" * (len(methods) + 1) + "|"]
-        for value, is_default in zip(table.index, same, strict=True):
-            shown = f"**{value}**" if is_default else value
+        found = default_value(str(scenario), name)
+        usual = "no limit" if found is None else parse_value(str(found))
+        if usual not in map(parse_value, table.index):
+            table = pd.concat([pd.DataFrame(default.apply(cell, axis=1).rename(str(usual))).T, table])
+        for value in table.index:
+            shown = f"**{value}**" if parse_value(value) == usual else value
             lines.append(f"| {shown} | " + " | ".join(table.loc[value, methods]) + " |")
         lines.append("")
     return "\n".join(lines)
+
+
+def default_value(scenario: str, name: str) -> object:
+    """What a scenario has for a choice when nothing is set."""
+    owner, _, parameter = name.rpartition(".")
+    if owner in controllers:
+        return parameters(controllers[owner])[parameter]
+    loaded = load_scenario(scenario)
+    if name == "speed_limit":
+        return loaded.speed_limit or Ramp.load(loaded.ramp).speed_limit
+    if owner == "merging":
+        return getattr(loaded.merging_car(), parameter)
+    found: object = loaded
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
 
 
 def findings(rows: pd.DataFrame) -> str:
@@ -113,6 +135,7 @@ def findings(rows: pd.DataFrame) -> str:
         default = rates.loc[""]
         order = ", ".join(f"{method} {rate:.1f} %" for method, rate in default.sort_values(kind="stable").items())
         lines.append(f"- **{scenario}**, with the defaults: {order}.")
+        lines[-1] += f" One case more or less is {100 / here['n'].max():.2g} points."
         varied = rates.drop(index="")
         turned = [variation for variation, row in varied.iterrows() if reversed_pairs(default, row)]
         lines.append(f"- The order of two methods is turned round by {grouped(turned) or 'no value at all'}.")
