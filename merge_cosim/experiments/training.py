@@ -24,14 +24,14 @@ def train(
     Raises:
         UserError: There are no such pairs, or too few of one intention.
     """
+    if out.suffix != ".json":
+        raise UserError(f"{out}: a model file ends in .json")
     pairs = Pairs.model_validate({"kind": "pairs", "sites": {site: "train"}, "split": split, "seed": seed})
     encounters = pairs_of_site(site, pairs, data, source)
     chosen = split_cars(encounters, pairs.fraction, pairs.seed, pairs.split)
     train_part = encounters.take(np.flatnonzero(chosen))
     settings = {"split": split, "fraction": pairs.fraction, "seed": seed, "rules": vars(pairs.rules)}
     model = fit(train_part, out.stem, settings)
-    if out.suffix != ".json":
-        raise UserError(f"{out}: a model file ends in .json")
     out.parent.mkdir(parents=True, exist_ok=True)
     model.save(out)
     held_out = encounters.take(np.flatnonzero(~chosen))

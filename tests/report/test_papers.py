@@ -70,7 +70,8 @@ def test_the_page_shows_every_part_offline(reproduced):
         assert (reproduced / link).is_file()
     names = {file.stem for file in (reproduced / "tables").glob("*.csv")}
     assert {
-        f"surrogate-{name}" for name in ("claims", "data-sets", "failures", "validity", "mixture", "nodes")
+        f"surrogate-{name}"
+        for name in ("claims", "data-sets", "failures", "bounds", "same-cases", "validity", "mixture", "nodes")
     } <= names
     assert names == {file.stem for file in (reproduced / "tables").glob("*.tex")}
 

@@ -13,8 +13,8 @@ from merge_cosim.experiments.reproduction import Study
 from merge_cosim.experiments.single import trace_methods
 from merge_cosim.report.methods import in_order
 
-LOGGED_METHODS = ("ipcb", "pgm-g", "pgm", "fg-gmm", "human")
-"""Methods of the published figure, FG-GMM, and the human host."""
+LOGGED_METHODS = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg-gmm", "dbn-pf", "human")
+"""All methods of the papers, and the human host."""
 WANTED = {"host_station": -170.0, "host_speed": 9.9, "merging_station": -100.0, "merging_speed": 10.4}
 """Initial state of the published case [m, m/s] (Dong, Dolan, Litkouhi, station and speed over time)."""
 NEAR = {"host_station": 20.0, "host_speed": 2.0, "merging_station": 20.0, "merging_speed": 2.0}

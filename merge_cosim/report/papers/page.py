@@ -30,6 +30,10 @@ ABOUT_TESTS = (
     "merging point. 'always-brake' never fails and never arrives, so failures alone say little. Grey rows are "
     "references, no rivals."
 )
+ABOUT_BOUNDS = (
+    "Exact bounds against the log, whatever a host decides: full braking or full throttle avoids the overlap, or "
+    "neither; and the smallest delay with which a host can pass without one."
+)
 ABOUT_VALIDITY = (
     f"The first {tables.VALIDITY_PAIRS} pairs of each test by name, or all that there are; the paper took 100 pairs of "
     "one period of each site. Pairs that could not be scored to the end are left out of the rate."
@@ -118,6 +122,7 @@ def _chapter(evidence: Evidence, study: Study) -> Chapter:
         Part("The papers' claims", ABOUT_CLAIMS, {"claims": claims.claims_table(evidence)}),
         Part("Data sets (PGM, Table I)", tables={"data-sets": tables.data_sets(evidence.source, data)}),
         Part("All methods in all tests (PGM, Table II; FG-GMM, Table III)", ABOUT_TESTS, tables.outcomes(evidence)),
+        Part("Bounds", ABOUT_BOUNDS, {"bounds": tables.bounds(study)}),
         Part("Validity of FG and GMM (FG-GMM, Table II)", ABOUT_VALIDITY, {"validity": tables.validity(evidence)}),
         _nodes(evidence, drawn),
         Part("Beliefs by distance", ABOUT_BELIEFS, tables.beliefs(evidence)),

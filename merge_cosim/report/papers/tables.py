@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from merge_cosim.experiments.bounds import MOST_DELAY, bounds_of
+from merge_cosim.experiments.reproduction import Study
+from merge_cosim.experiments.scenario import load_scenario
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.ngsim.encounters import site_pairs
 from merge_cosim.ngsim.sites import SITES
@@ -92,7 +95,41 @@ def outcomes(evidence: Evidence) -> dict[str, Table]:
             Column("unnecessary_yields", "needless", 0),
         ],
     )
-    return {"failures": failures, "distances": distances, "costs": costs, "time": _times(evidence)}
+    compared = _by_test(
+        evidence,
+        "Failures against pgm on the same cases (McNemar's exact test; a fixed grid has counts alone)",
+        [
+            Column("only_this_fails", "only this fails", 0),
+            Column("only_other_fails", "only pgm fails", 0),
+            Column("mcnemar_p", "p", 4),
+        ],
+    )
+    return {
+        "failures": failures,
+        "same-cases": compared,
+        "distances": distances,
+        "costs": costs,
+        "time": _times(evidence),
+    }
+
+
+def bounds(study: Study) -> Table:
+    """How many cases of each replay no host could pass, or not without a long delay."""
+    request = study.request
+    rows = [
+        row
+        for scenario in request.scenarios
+        if load_scenario(scenario).is_replay
+        for row in bounds_of(scenario, request.settings, request.data, request.source)[1]
+    ]
+    columns = [
+        Column("scenario", "test"),
+        Column("n", "pairs", 0),
+        Column("infeasible", "infeasible", 0),
+        Column("infeasible_in_time", f"infeasible within {MOST_DELAY:g} s of free driving", 0),
+        Column("min_delay_s", "mean of the smallest delays s", 2),
+    ]
+    return Table.of(pd.DataFrame(rows), columns, [False] * len(rows), "What any host could have done")
 
 
 def _by_test(
