@@ -57,7 +57,7 @@ def overlap_figure(data: Path, site: Site) -> Figure:
     if tracks is None or not len(tracks.merges()[0]):
         raise UserError(f"{data}: no merging car of {site.name} in it")
     host, merging = _busiest_host(tracks)
-    leader = _leader(tracks, host)
+    leader = _leader(tracks, host, merging)
     cars = [*([("leading car", leader)] if leader is not None else []), ("host", host)]
     cars += [("merging car", int(track)) for track in merging[:MOST_MERGING]]
     origin = tracks.first_frame[[track for _, track in cars]].min()
@@ -89,11 +89,11 @@ def _busiest_host(tracks: Tracks) -> tuple[int, IntArray]:
     return best, found
 
 
-def _leader(tracks: Tracks, host: int) -> int | None:
-    """The car ahead of a host in the middle of its track."""
+def _leader(tracks: Tracks, host: int, merging: IntArray) -> int | None:
+    """The car ahead of a host in the middle of its track that is none of the merging cars."""
     frame = (tracks.first_frame[host] + tracks.last_frame[host]) // 2
     there = (tracks.recording == tracks.recording[host]) & (tracks.first_frame <= frame) & (frame <= tracks.last_frame)
-    there[host] = False
+    there[[host, *merging.tolist()]] = False
     others = np.flatnonzero(there)
     rows = tracks.row(others, np.full(len(others), frame))
     lead = tracks.y[rows] - tracks.y[tracks.row(np.array([host]), np.array([frame]))[0]]
