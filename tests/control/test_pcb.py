@@ -62,7 +62,7 @@ def test_cost_of_one_candidate_by_hand():
 state = st.tuples(st.floats(-120, 5), st.floats(0, 30))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(host=state, merging=state, lengths=st.tuples(st.floats(3, 15), st.floats(3, 15)), means=st.booleans())
 def test_costs_are_those_of_a_plain_loop(host, merging, lengths, means):
     controller = ready(Pcb(means="arrival" if means else "fixed"))

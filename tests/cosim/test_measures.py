@@ -22,7 +22,7 @@ def outcome(seed, method):
     return run.columns, post_encroachment(run.columns, encounters, 0.1)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.sampled_from(["always-go", "always-yield", "slot-time"]))
 def test_failure_gap_time_and_encroachment_agree(seed, method):
     c, pet = outcome(seed, method)
@@ -38,7 +38,7 @@ def test_failure_gap_time_and_encroachment_agree(seed, method):
     assert (np.nan_to_num(pet, nan=1.0)[rear_end] > -0.1).all()
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.integers(0, 10_000))
 def test_times_are_in_order(seed):
     c, _ = outcome(seed, "slot-time")

@@ -12,7 +12,7 @@ def ratio(before, now):
     return np.sin(before) + 3.0 * np.cos(now)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     speeds=st.lists(st.floats(0, 30), min_size=1, max_size=150),
     lag=st.sampled_from([1, 2, 5, 10]),
@@ -29,7 +29,7 @@ def test_the_running_sum_is_the_direct_sum(speeds, lag, window, keep):
         assert evidence.add(v[t : t + 1])[0] == pytest.approx(direct, abs=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(begin=st.integers(0, 40), lag=st.sampled_from([1, 5]), window=st.integers(1, 20))
 def test_a_driver_who_begins_later_is_the_same_driver(begin, lag, window):
     """Rings are shared, so where a driver begins in them must not matter."""

@@ -63,7 +63,7 @@ def test_only_the_variant_sees_the_host():
         assert begin(FgTime(), model).update(now)[0] == pytest.approx(begin(Fg(), model).update(now)[0] + time)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     speeds=st.lists(st.floats(5, 25), min_size=1, max_size=80),
     frames=st.integers(1, 30),

@@ -35,7 +35,7 @@ batches = st.tuples(st.integers(1, 5), st.integers(1, 40)).flatmap(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(weights=batches, start=st.floats(1e-6, 1 - 1e-6), count=st.integers(1, 60))
 def test_every_particle_is_drawn_within_one_of_its_share(weights, start, count):
     weights[:, 0] += 0.01

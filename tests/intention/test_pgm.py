@@ -21,7 +21,7 @@ def test_one_node_is_time_and_prior():
         np.testing.assert_array_equal(estimator.update(now), expected)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     speeds=st.lists(st.floats(0, 30), min_size=1, max_size=80),
     nodes=st.integers(1, 60),

@@ -6,7 +6,7 @@ from geometry.frame import Frame, Tie
 from geometry.lines import SURVEY_FOOT, Line, read_lines
 from geometry.ramp_lanes import Correction, joined
 from geometry.survey import lane_centres, middle, strip_widths
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 RADIUS = 400.0
@@ -23,7 +23,6 @@ def test_arc_length_and_sides() -> None:
     assert inner.length == pytest.approx(300.0 * (1.0 - 10.0 / RADIUS), rel=1e-4)
 
 
-@settings(deadline=None)
 @given(station=st.floats(2.0, 398.0), right=st.floats(-30.0, 30.0))
 def test_locate_is_the_inverse_of_place(station: float, right: float) -> None:
     along, across = BEND.locate(BEND.place(np.array([station]), right))
@@ -31,7 +30,6 @@ def test_locate_is_the_inverse_of_place(station: float, right: float) -> None:
     assert across[0] == pytest.approx(right, abs=0.01)
 
 
-@settings(deadline=None)
 @given(tolerance=st.floats(0.005, 1.0))
 def test_no_dropped_corner_is_further_off_than_the_tolerance(tolerance: float) -> None:
     simple = BEND.simple(tolerance)
