@@ -1,8 +1,8 @@
 """Write a big CSV in the format of the NGSIM portal, with all its quirks, to time the reader with.
 
-The cars are made up: they follow straight lines at constant speed. What is true to the portal is the format: a
-byte-order mark, 25 columns, quoted thousands, four locations, Vehicle_IDs that repeat between periods, cars in no
-order, and repeated rows.
+The cars are made up: they follow straight lines at constant speed, and those of lane 7 change into the host lane
+halfway, so that there are pairs. What is true to the portal is the format: a byte-order mark, 25 columns, quoted
+thousands, four locations, Vehicle_IDs that repeat between periods, cars in no order, and repeated rows.
 
     python tools/make_portal_csv.py big.csv --rows 12000000
 """
@@ -27,6 +27,7 @@ PERIODS = (
     ("peachtree", 1_163_019_100_000),
 )
 """Location and clock origin [ms] of each period; the last two locations only need to be passed over."""
+HOST_LANES = {"us-101": 5, "i-80": 6}
 
 
 def thousands(values: np.ndarray, digits: int) -> pa.Array:
@@ -46,6 +47,8 @@ def cars(location: str, origin: int, ids: np.ndarray, rng: np.random.Generator) 
     frame = (rng.integers(0, 8_000, n)[:, None] + np.arange(FRAMES)).ravel()
     speed = np.repeat(rng.uniform(20.0, 35.0, n), FRAMES)
     lane = np.repeat(rng.integers(1, 8, n), FRAMES)
+    second_half = np.tile(np.arange(FRAMES) >= FRAMES // 2, n)
+    lane = np.where((lane == 7) & second_half, HOST_LANES.get(location, 7), lane)
     y = speed * np.tile(np.arange(FRAMES) * 0.1, n)
     zero, nothing = np.zeros(len(y), dtype=np.int8), np.full(len(y), "")
     columns = {

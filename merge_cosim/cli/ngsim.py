@@ -7,6 +7,9 @@ import typer
 
 app = typer.Typer(help="Import, fetch, look at and imitate NGSIM trajectories.", no_args_is_help=True)
 
+MOST_NAMES = 8
+"""Pairs that are named at most."""
+
 Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="NGSIM files: text, CSV or Parquet.")]
 OptionalSite = Annotated[
     str | None,
@@ -106,11 +109,17 @@ def summary(
             "flagged": f"{each.smoothed_source} smoothed at the source, {each.length_missing} without a length, "
             f"{each.host_past_start} with the host past the merging point at the start",
             "rejected": ", ".join(f"{count} {why}" for why, count in each.rejected.items()) or "none",
-            "logged host fails": ", ".join(each.logged_host_failures) or "in no pair",
+            "logged host fails": _few(each.logged_host_failures) or "in no pair",
         }
         console.print(f"{each.site} ({each.source})")
         for name, text in lines.items():
             console.print(f"  {name}: {text}", soft_wrap=True)
+
+
+def _few(names: tuple[str, ...]) -> str:
+    """Names in a line, not too many."""
+    more = f" and {len(names) - MOST_NAMES} more (all of them with --json)" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
 
 
 @app.command("surrogate")
