@@ -27,8 +27,8 @@ ABOUT_CLAIMS = (
 )
 ABOUT_TESTS = (
     "Failures are overlaps of the two bodies in the lane. D is the distance between the fronts when the host is at the "
-    "merging point. 'always-brake' never fails and never arrives, so failures alone say little. Grey rows are "
-    "references, no rivals."
+    "merging point. In Designed Test II always-brake never fails and never arrives: failures alone say little. Grey "
+    "rows are references, no rivals."
 )
 ABOUT_BOUNDS = (
     "Exact bounds against the log, whatever a host decides: full braking or full throttle avoids the overlap, or "
