@@ -108,9 +108,15 @@ def run(
     gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui.")] = False,
     delay: Annotated[int, typer.Option(help="With --gui: milliseconds per step.")] = 100,
     trace: Annotated[Path | None, typer.Option(help="Write every cycle to this file (.csv or .parquet).")] = None,
+    fcd: Annotated[Path | None, typer.Option(help="SUMO's floating car data.")] = None,
+    ssm: Annotated[Path | None, typer.Option(help="SUMO's conflicts: TTC, DRAC, PET.")] = None,
+    lanechange: Annotated[Path | None, typer.Option(help="SUMO's lane changes.")] = None,
+    tripinfo: Annotated[Path | None, typer.Option(help="SUMO's trip of each car.")] = None,
+    collisions: Annotated[Path | None, typer.Option(help="SUMO's collisions.")] = None,
     json: Json = False,
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
+    from merge_cosim.cosim.outputs import SumoOutputs
     from merge_cosim.experiments.methods import parse_setting
     from merge_cosim.experiments.plan import SweepRequest
     from merge_cosim.experiments.single import run_single
@@ -126,7 +132,8 @@ def run(
         seed=seed,
         plugins=plugin or (),
     )
-    row = run_single(request, case, gui_delay=delay if gui else None, trace=trace)
+    outputs = SumoOutputs(fcd, ssm, lanechange, tripinfo, collisions)
+    row = run_single(request, case, gui_delay=delay if gui else None, trace=trace, outputs=outputs)
     if json:
         print_json(row)
     else:

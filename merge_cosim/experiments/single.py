@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.plant import SumoPlant
 from merge_cosim.cosim.session import Session, SumoOptions, TraciSession
 from merge_cosim.errors import UserError
@@ -22,9 +23,15 @@ from merge_cosim.ramps.tiles import tile_id
 from merge_cosim.ramps.view import view_options
 from merge_cosim.registry import did_you_mean
 
+NO_OUTPUTS = SumoOutputs()
+
 
 def run_single(
-    request: SweepRequest, case: str, gui_delay: int | None = None, trace: Path | None = None
+    request: SweepRequest,
+    case: str,
+    gui_delay: int | None = None,
+    trace: Path | None = None,
+    outputs: SumoOutputs = NO_OUTPUTS,
 ) -> dict[str, Any]:
     """Run one case of one scenario under one method.
 
@@ -33,17 +40,20 @@ def run_single(
         case: Name of the case.
         gui_delay: Milliseconds per step in sumo-gui; None runs without a window.
         trace: File for the cycle-by-cycle record (.csv or .parquet), or None.
+        outputs: Files that SUMO is to write.
 
     Returns:
         The result row.
 
     Raises:
-        UserError: There is no such case, or the trace's file name has another ending.
+        UserError: There is no such case, the trace's file name has another ending, or the method is the log itself
+            and a window or SUMO's outputs are asked for.
+        OSError: A file cannot be written.
     """
     if trace is not None and trace.suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: --trace writes .csv or .parquet")
     batch = _case_alone(plan(request), case)
-    row, record = trace_case(batch, gui_delay)
+    row, record = trace_case(batch, gui_delay, outputs)
     if trace is not None:
         trace.parent.mkdir(parents=True, exist_ok=True)
         if trace.suffix == ".csv":
@@ -53,16 +63,22 @@ def run_single(
     return row
 
 
-def trace_case(batch: Batch, gui_delay: int | None = None) -> tuple[dict[str, Any], pd.DataFrame]:
+def trace_case(
+    batch: Batch, gui_delay: int | None = None, outputs: SumoOutputs = NO_OUTPUTS
+) -> tuple[dict[str, Any], pd.DataFrame]:
     """Run a batch of one and return its result row and its record, one row per cycle."""
     ramp = Ramp.load(batch.scenario.ramp)
-    if gui_delay is not None and batch.method.is_human:
-        raise UserError("--gui: the method 'human' is the log itself and is not driven in SUMO; leave one of them out")
+    if batch.method.is_human and (gui_delay is not None or outputs.wanted):
+        asked = "--gui" if gui_delay is not None else "SUMO's outputs"
+        raise UserError(
+            f"{asked}: the method 'human' is the log itself and is not driven in SUMO; leave one of them out"
+        )
+    extra = outputs.prepare()
     if gui_delay is None:
-        plant = SumoPlant(ramp, 1, batch.seed)
+        plant = SumoPlant(ramp, 1, batch.seed, extra=extra)
     else:
         shown = (*view_options(ramp.net.parent), "--delay", str(gui_delay))
-        plant = SumoPlant(ramp, 1, batch.seed, _open_window, shown)
+        plant = SumoPlant(ramp, 1, batch.seed, _open_window, (*shown, *extra))
     try:
         if isinstance(plant.session, TraciSession):
             plant.session.follow(tile_id(0, "host"))
