@@ -113,9 +113,13 @@ def run(
     lanechange: Annotated[Path | None, typer.Option(help="SUMO's lane changes.")] = None,
     tripinfo: Annotated[Path | None, typer.Option(help="SUMO's trip of each car.")] = None,
     collisions: Annotated[Path | None, typer.Option(help="SUMO's collisions.")] = None,
+    attach: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Drive in a SUMO that runs with --remote-port.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
+    from merge_cosim.cosim.attached import Address
     from merge_cosim.cosim.outputs import SumoOutputs
     from merge_cosim.experiments.methods import parse_setting
     from merge_cosim.experiments.plan import SweepRequest
@@ -133,7 +137,8 @@ def run(
         plugins=plugin or (),
     )
     outputs = SumoOutputs(fcd, ssm, lanechange, tripinfo, collisions)
-    row = run_single(request, case, gui_delay=delay if gui else None, trace=trace, outputs=outputs)
+    address = Address.parse(attach) if attach else None
+    row = run_single(request, case, delay if gui else None, trace, outputs, address)
     if json:
         print_json(row)
     else:

@@ -82,16 +82,29 @@ class SumoPlant:
         seed: int = 0,
         open_session: Callable[[SumoOptions], Session] = LibsumoSession,
         extra: tuple[str, ...] = (),
+        tiled: bool = True,
     ) -> None:
+        """Open a session and add the cars.
+
+        Args:
+            ramp: The ramp.
+            count: Number of tiles.
+            seed: SUMO's seed.
+            open_session: What opens SUMO.
+            extra: Further options of SUMO.
+            tiled: The session's net has tiles, not the ramp's own edges, which hold one encounter at a time.
+        """
         self.ramp = ramp
         self.count = count
         self.step_s = 0.0
-        self.session = open_session(SumoOptions(tile_net(ramp, count), seed=seed, extra=extra))
-        self._names = [tile_id(tile, car) for car in ("host", "merging") for tile in range(count)]
+        self._id = tile_id if tiled else _own_id
+        net = tile_net(ramp, count) if tiled else ramp.net
+        self.session = open_session(SumoOptions(net, seed=seed, extra=extra))
+        self._names = [self._id(tile, car) for car in ("host", "merging") for tile in range(count)]
         self._row = {name: row for row, name in enumerate(self._names)}
         routes = (ramp.main_route, ramp.ramp_route)
         self.session.add(
-            Car(name, tuple(tile_id(row % count, edge) for edge in routes[row // count]), COLORS[row // count])
+            Car(name, tuple(self._id(row % count, edge) for edge in routes[row // count]), COLORS[row // count])
             for name, row in self._row.items()
         )
         start = {section.edge: section.start for section in ramp.main + ramp.ramp}
@@ -128,7 +141,7 @@ class SumoPlant:
         for row, merge_position, station, speed, length in zip(*values, strict=True):
             name = self._names[row]
             where = self.ramp.place(path, station, merge_position)
-            self.session.place(name, tile_id(row % self.count, f"{where.edge}_{where.lane}"), where.position, speed)
+            self.session.place(name, self._id(row % self.count, f"{where.edge}_{where.lane}"), where.position, speed)
             self._edge[row] = self._edge_number[path == "ramp"][where.edge]
             self._position[row] = where.position
             if self._length[row] != length:
@@ -156,7 +169,7 @@ class SumoPlant:
         station = position + self._edge_start[self._edge] - self._merge_position
         self._set_state(station, (station - self._station) / DT)
         self.colliding = np.zeros(self.count, dtype=bool)
-        for name in self.session.colliding():
+        for name in self._row.keys() & self.session.colliding():
             self.colliding[self._row[name] % self.count] = True
 
     def _set_state(self, station: FloatArray, speed: FloatArray) -> None:
@@ -168,3 +181,7 @@ class SumoPlant:
     def close(self) -> None:
         """End the simulation."""
         self.session.close()
+
+
+def _own_id(_tile: int, name: str) -> str:
+    return name

@@ -40,16 +40,23 @@ class SumoOptions:
     check_junctions: bool = False
     extra: tuple[str, ...] = ()
 
+    @property
+    def conditions(self) -> dict[str, str]:
+        """The options that decide how an encounter goes on, by SUMO's names."""
+        return {
+            "step-length": str(self.step_length),
+            "time-to-teleport": "-1",
+            "collision.action": self.collision_action,
+            "collision.mingap-factor": "0",
+            "collision.check-junctions": str(self.check_junctions).lower(),
+        }
+
     def arguments(self) -> list[str]:
         """The options as SUMO's command line has them."""
         options = {
             "--net-file": self.net,
-            "--step-length": self.step_length,
             "--seed": self.seed,
-            "--time-to-teleport": -1,
-            "--collision.action": self.collision_action,
-            "--collision.mingap-factor": 0,
-            "--collision.check-junctions": str(self.check_junctions).lower(),
+            **{f"--{name}": value for name, value in self.conditions.items()},
             "--no-step-log": "true",
             "--no-warnings": "true",
             "--duration-log.disable": "true",
@@ -112,7 +119,7 @@ class RawCalls(NamedTuple):
     lane_position: Callable[[str], float]
 
 
-class _ApiSession:
+class ApiSession:
     """What libsumo and TraCI share: the same modules with the same functions."""
 
     def __init__(self, api: Any, raw: RawCalls) -> None:
@@ -171,7 +178,7 @@ class _ApiSession:
         self._api.close()
 
 
-class LibsumoSession(_ApiSession):
+class LibsumoSession(ApiSession):
     """SUMO inside this process. libsumo holds one simulation per process: opening a second one ends the first."""
 
     def __init__(self, options: SumoOptions) -> None:
@@ -183,15 +190,13 @@ class LibsumoSession(_ApiSession):
         _open(lambda: libsumo.start(["sumo", *options.arguments()]), options, errors)
 
 
-class TraciSession(_ApiSession):
+class TraciSession(ApiSession):
     """SUMO, or sumo-gui, in a process of its own."""
 
     def __init__(self, options: SumoOptions, gui: bool = False) -> None:
         import sumolib
-        import traci
 
-        if "libsumo" in str(getattr(traci, "__file__", "")):
-            raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
+        traci = own_traci()
         errors = (traci.TraCIException, traci.FatalTraCIError)
         super().__init__(traci, RawCalls(traci.vehicle.setSpeed, traci.vehicle.getLanePosition))
         command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *options.arguments()]
@@ -204,6 +209,15 @@ class TraciSession(_ApiSession):
         """Let the view of sumo-gui follow a car."""
         self._api.gui.trackVehicle(_VIEW, car)
         self._api.gui.setZoom(_VIEW, _ZOOM)
+
+
+def own_traci() -> Any:
+    """The module traci, and not libsumo under its name."""
+    import traci
+
+    if "libsumo" in str(getattr(traci, "__file__", "")):
+        raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
+    return traci
 
 
 def _open(start: Callable[[], object], options: SumoOptions, errors: tuple[type[Exception], ...]) -> None:

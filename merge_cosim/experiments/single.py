@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from merge_cosim.cosim.attached import Address, AttachedSession
 from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.plant import SumoPlant
 from merge_cosim.cosim.session import Session, SumoOptions, TraciSession
@@ -32,6 +33,7 @@ def run_single(
     gui_delay: int | None = None,
     trace: Path | None = None,
     outputs: SumoOutputs = NO_OUTPUTS,
+    attach: Address | None = None,
 ) -> dict[str, Any]:
     """Run one case of one scenario under one method.
 
@@ -41,19 +43,20 @@ def run_single(
         gui_delay: Milliseconds per step in sumo-gui; None runs without a window.
         trace: File for the cycle-by-cycle record (.csv or .parquet), or None.
         outputs: Files that SUMO is to write.
+        attach: Drive in the SUMO that listens there, instead of one of our own.
 
     Returns:
         The result row.
 
     Raises:
         UserError: There is no such case, the trace's file name has another ending, or the method is the log itself
-            and a window or SUMO's outputs are asked for.
+            and a window, SUMO's outputs or a running SUMO are asked for; or SUMO is not as it must be.
         OSError: A file cannot be written.
     """
     if trace is not None and trace.suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: --trace writes .csv or .parquet")
     batch = _case_alone(plan(request), case)
-    row, record = trace_case(batch, gui_delay, outputs)
+    row, record = trace_case(batch, gui_delay, outputs, attach)
     if trace is not None:
         trace.parent.mkdir(parents=True, exist_ok=True)
         if trace.suffix == ".csv":
@@ -64,17 +67,22 @@ def run_single(
 
 
 def trace_case(
-    batch: Batch, gui_delay: int | None = None, outputs: SumoOutputs = NO_OUTPUTS
+    batch: Batch, gui_delay: int | None = None, outputs: SumoOutputs = NO_OUTPUTS, attach: Address | None = None
 ) -> tuple[dict[str, Any], pd.DataFrame]:
     """Run a batch of one and return its result row and its record, one row per cycle."""
     ramp = Ramp.load(batch.scenario.ramp)
-    if batch.method.is_human and (gui_delay is not None or outputs.wanted):
-        asked = "--gui" if gui_delay is not None else "SUMO's outputs"
+    asked = {"--gui": gui_delay is not None, "SUMO's outputs": outputs.wanted, "--attach": attach is not None}
+    wanted = [name for name, given in asked.items() if given]
+    if wanted and batch.method.is_human:
         raise UserError(
-            f"{asked}: the method 'human' is the log itself and is not driven in SUMO; leave one of them out"
+            f"{wanted[0]}: the method 'human' is the log itself and is not driven in SUMO; leave one of them out"
         )
+    if attach is not None and len(wanted) > 1:
+        raise UserError(f"{wanted[0]}: not with --attach; whoever starts SUMO chooses the window and the outputs")
     extra = outputs.prepare()
-    if gui_delay is None:
+    if attach is not None:
+        plant = SumoPlant(ramp, 1, batch.seed, lambda options: AttachedSession(options, attach), tiled=False)
+    elif gui_delay is None:
         plant = SumoPlant(ramp, 1, batch.seed, extra=extra)
     else:
         shown = (*view_options(ramp.net.parent), "--delay", str(gui_delay))

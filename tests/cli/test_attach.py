@@ -1,0 +1,128 @@
+"""A case in a SUMO that runs already."""
+
+import json
+import socket
+import subprocess
+
+import pytest
+import sumolib
+from command import merge_cosim
+
+from merge_cosim.experiments.plan import SweepRequest, plan
+from merge_cosim.ramps.ramp import Ramp
+
+CONDITIONS = {
+    "step-length": "0.1",
+    "no-internal-links": "true",
+    "time-to-teleport": "-1",
+    "collision.action": "warn",
+    "collision.mingap-factor": "0",
+}
+TRAFFIC = """<routes>
+<vehicle id="other" depart="0" departLane="best" departPos="300" departSpeed="max">
+<route edges="main_in weave main_out"/></vehicle>
+</routes>
+"""
+
+
+class Running:
+    """A SUMO that listens on a free port, and that ends with the block."""
+
+    def __init__(self, ramp, *further, **conditions):
+        with socket.socket() as free:
+            free.bind(("localhost", 0))
+            self.port = free.getsockname()[1]
+        words = [w for name, value in (CONDITIONS | conditions).items() for w in (f"--{name}", value)]
+        net = ("-n", Ramp.load(ramp).net, "--remote-port", str(self.port))
+        self.command = [sumolib.checkBinary("sumo"), *net, *words, *further]
+
+    def __enter__(self):
+        self.process = subprocess.Popen(self.command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        return f"localhost:{self.port}"
+
+    def __exit__(self, *_):
+        try:
+            assert self.process.wait(30) == 0  # it ends with its last client
+        finally:
+            self.process.kill()
+
+
+def row_of(done):
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_outcome_is_that_of_our_own_sumo(tmp_path):
+    case = ("run", "designed-2", "--case", "d-3_h15_m15", "--method", "always-go", "--json")
+    with Running("designed") as address:
+        attached = row_of(merge_cosim(*case, "--attach", address, "--trace", "attached.csv", cwd=tmp_path))
+    assert attached == row_of(merge_cosim(*case, "--trace", "own.csv", cwd=tmp_path))
+    assert attached["failed"]
+    assert (tmp_path / "attached.csv").read_bytes() == (tmp_path / "own.csv").read_bytes()
+
+
+def test_it_is_the_same_beside_other_traffic_and_in_an_auxiliary_lane(tmp_path):
+    name = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].encounters.case[0]
+    case = ("run", "us101-replay", "--source", "surrogate", "--case", name, "--method", "acc", "--json")
+    (tmp_path / "other.rou.xml").write_text(TRAFFIC)
+    with Running("us101", "-r", tmp_path / "other.rou.xml", "--fcd-output", tmp_path / "fcd.xml") as address:
+        attached = row_of(merge_cosim(*case, "--attach", address, cwd=tmp_path))
+    assert attached == row_of(merge_cosim(*case, cwd=tmp_path))
+    seen = {car.id for step in sumolib.xml.parse(str(tmp_path / "fcd.xml"), "timestep") for car in step.vehicle or ()}
+    assert seen == {"host", "merging", "other"}
+
+
+@pytest.mark.parametrize(
+    ("ramp", "conditions", "expected"),
+    [
+        ("designed", {"step-length": "1", "collision.action": "teleport"}, "--step-length 0.1 --collision.action warn"),
+        ("designed", {"no-internal-links": "false"}, "must be started with --no-internal-links true"),
+        ("us101", {}, "SUMO has another net: no lane main_out_0 of"),
+    ],
+)
+def test_another_simulation_is_refused_in_one_line(tmp_path, ramp, conditions, expected):
+    with Running(ramp, **conditions) as address:
+        arguments = ("run", "designed-2", "--case", "d+1_h15_m14", "--method", "acc", "--attach", address)
+        done = merge_cosim(*arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    (line,) = done.stderr.strip().splitlines()
+    assert expected in line
+
+
+def test_a_car_of_the_same_name_is_refused(tmp_path):
+    text = TRAFFIC.replace("other", "host").replace("main_in weave main_out", "main_in main_out")
+    (tmp_path / "host.rou.xml").write_text(text)
+    with Running("designed", "-r", tmp_path / "host.rou.xml") as address:
+        arguments = ("run", "designed-2", "--case", "d+1_h15_m14", "--method", "acc", "--attach", address)
+        done = merge_cosim(*arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    (line,) = done.stderr.strip().splitlines()
+    assert "the cars cannot be added: " in line
+
+
+def test_nobody_listening_is_said_in_one_line(tmp_path):
+    with socket.socket() as taken:  # bound, but not listening
+        taken.bind(("localhost", 0))
+        address = f"localhost:{taken.getsockname()[1]}"
+        arguments = ("run", "designed-2", "--case", "d+1_h15_m14", "--method", "acc", "--attach", address)
+        done = merge_cosim(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    assert f"--attach {address}: no SUMO listens there" in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--attach", "8813"), "--attach 8813: not HOST:PORT"),
+        (("--attach", "localhost:99999"), "not HOST:PORT"),
+        (("--attach", "localhost:8813", "--gui"), "--gui: not with --attach"),
+        (("--attach", "localhost:8813", "--fcd", "x.xml"), "SUMO's outputs: not with --attach"),
+    ],
+)
+def test_mistakes_get_one_line_and_status_2(tmp_path, arguments, expected):
+    done = merge_cosim("run", "designed-2", "--case", "d+1_h15_m14", "--method", "acc", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert expected in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not any(tmp_path.iterdir())
