@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import redirect_stdout
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -218,6 +218,19 @@ def own_traci() -> Any:
     if "libsumo" in str(getattr(traci, "__file__", "")):
         raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
     return traci
+
+
+@contextmanager
+def connection_kept() -> Iterator[None]:
+    """Turn the end of a SUMO in another process, as when its window is closed, into one line."""
+    try:
+        yield
+    except Exception as error:
+        import traci
+
+        if not isinstance(error, traci.FatalTraCIError):
+            raise
+        raise UserError(f"SUMO has ended before the case was over: {error}") from None
 
 
 def _open(start: Callable[[], object], options: SumoOptions, errors: tuple[type[Exception], ...]) -> None:

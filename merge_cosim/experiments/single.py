@@ -14,7 +14,7 @@ import pandas as pd
 from merge_cosim.cosim.attached import Address, AttachedSession
 from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.plant import SumoPlant
-from merge_cosim.cosim.session import Session, SumoOptions, TraciSession
+from merge_cosim.cosim.session import Session, SumoOptions, TraciSession, connection_kept
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.plan import SweepRequest, plan
 from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
@@ -90,7 +90,8 @@ def trace_case(
     try:
         if isinstance(plant.session, TraciSession):
             plant.session.follow(tile_id(0, "host"))
-        run = simulate_batch(batch, plant, ramp, traced=(0,))
+        with connection_kept():
+            run = simulate_batch(batch, plant, ramp, traced=(0,))
     finally:
         plant.close()
     return rows_of(batch, run, ramp).to_pylist()[0], pd.DataFrame(run.traces[0])

@@ -1,0 +1,39 @@
+"""A session in a SUMO of the user's own; tests/cli/test_attach.py runs whole cases in one."""
+
+import socket
+import subprocess
+
+import numpy as np
+import pytest
+import sumolib
+
+from merge_cosim.cosim.attached import Address, AttachedSession
+from merge_cosim.cosim.plant import SumoPlant
+from merge_cosim.cosim.session import SumoOptions, connection_kept
+from merge_cosim.errors import UserError
+from merge_cosim.ramps.ramp import Ramp
+
+
+@pytest.mark.parametrize("text", ["8813", ":8813", "here:", "here:0", "here:65536", "here:x", "here:-1"])
+def test_an_address_is_host_and_port(text):
+    with pytest.raises(UserError, match="not HOST:PORT"):
+        Address.parse(text)
+    assert Address.parse("here:8813") == Address("here", 8813)
+
+
+def test_the_end_of_sumo_in_mid_run_is_told():
+    ramp = Ramp.load("designed")
+    with socket.socket() as free:
+        free.bind(("localhost", 0))
+        address = Address("localhost", free.getsockname()[1])
+    conditions = [word for name, value in SumoOptions(ramp.net).conditions.items() for word in (f"--{name}", value)]
+    command = [sumolib.checkBinary("sumo"), "-n", ramp.net, "--remote-port", str(address.port), *conditions]
+    running = subprocess.Popen([*command, "--no-internal-links"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        plant = SumoPlant(ramp, 1, open_session=lambda options: AttachedSession(options, address), tiled=False)
+    finally:
+        running.kill()
+        running.wait()
+    with pytest.raises(UserError, match="SUMO has ended before the case was over"), connection_kept():
+        plant.advance(np.zeros(1), np.zeros(1))
+    plant.close()
