@@ -43,6 +43,7 @@ def safety_table(summary: pd.DataFrame, section: Section) -> Table:
     """Surrogate safety, comfort, likeness to the human, and the failures of each pair of methods on the same cases."""
     rows = of_section(summary, section).copy()
     rows["cluster_pct"] = ranges(rows["cluster_low_pct"], rows["cluster_high_pct"])
+    rows["labelled"] = rows["labelled"].where(rows["labelled"] > 0)
     rows["distance_interval_m"] = ranges(rows["distance_low_m"], rows["distance_high_m"])
     against = rows["against"].dropna().unique()
     group = f"against {against[0]}" if len(against) else ""
