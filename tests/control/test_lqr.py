@@ -14,7 +14,9 @@ def ready(controller, dt=0.1):
 
 
 def command(controller, host, merging, target=True):
-    one = lambda value: np.array([float(value)])  # noqa: E731
+    def one(value):
+        return np.array([float(value)])
+
     now = Observation(*map(one, (*host, *merging, 5, 5)))
     return ready(controller).command(now, np.zeros(1), np.array([target]))[0]
 

@@ -15,7 +15,9 @@ LIMIT = 29.0
 
 
 def seen(host, merging, lengths=(5.0, 5.0)):
-    one = lambda value: np.array([float(value)])  # noqa: E731
+    def one(value):
+        return np.array([float(value)])
+
     return Observation(*map(one, (*host, *merging, *lengths)))
 
 

@@ -15,7 +15,9 @@ PRIOR = MODEL.prior_log_odds
 
 
 def seen(speed, merging=-50.0, host=-50.0, host_speed=10.0):
-    one = lambda value: np.array([float(value)])  # noqa: E731
+    def one(value):
+        return np.array([float(value)])
+
     return Observation(one(host), one(host_speed), one(merging), one(speed), one(5), one(5))
 
 

@@ -183,8 +183,8 @@ def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
     Missing where always-go was not run.
     """
     go = frame[frame["method"] == "always-go"].drop_duplicates(CASE)
-    possible = (go["host_first"] == True) & ~go["failed"] & (go["gap_m"].fillna(np.inf) >= D0)  # noqa: E712 - may be missing
+    possible = go["host_first"].eq(True) & ~go["failed"] & (go["gap_m"].fillna(np.inf) >= D0)
     known = frame[CASE].merge(go[CASE].assign(possible=possible.astype("boolean")), how="left", on=CASE)["possible"]
     known = known.set_axis(frame.index)
-    passed_second = (frame["host_first"] == False).to_numpy(dtype=bool)  # noqa: E712 - may be missing
+    passed_second = frame["host_first"].eq(False).to_numpy(dtype=bool)
     return (known & passed_second).where(known.notna())
