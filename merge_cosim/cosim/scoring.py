@@ -14,8 +14,8 @@ from merge_cosim.encounter import ReplayLog
 from merge_cosim.observation import Observation
 from merge_cosim.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
 
-KINDS = ("", "side", "host_into_merging", "merging_into_host")
-SIDE, HOST_INTO_MERGING, MERGING_INTO_HOST = 1, 2, 3
+KINDS = ("", "side", "host_into_merging", "merging_into_host", "host_into_leader")
+SIDE, HOST_INTO_MERGING, MERGING_INTO_HOST, HOST_INTO_LEADER = 1, 2, 3, 4
 GOAL = 50.0
 """Station [m] at which the delay is taken."""
 CROSSINGS = ("host_reached_s", "host_cleared_s", "goal_s", "merging_reached_s", "merging_cleared_s")

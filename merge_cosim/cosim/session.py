@@ -182,28 +182,18 @@ class LibsumoSession(ApiSession):
     """SUMO inside this process. libsumo holds one simulation per process: opening a second one ends the first."""
 
     def __init__(self, options: SumoOptions) -> None:
-        import libsumo
         from libsumo import _libsumo as raw  # the raw calls spare a Python frame per car and step
 
-        errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
+        libsumo, _ = libsumo_started(options.arguments(), options.net)
         super().__init__(libsumo, RawCalls(raw.vehicle_setSpeed, raw.vehicle_getLanePosition))
-        _open(lambda: libsumo.start(["sumo", *options.arguments()]), options, errors)
 
 
 class TraciSession(ApiSession):
     """SUMO, or sumo-gui, in a process of its own."""
 
     def __init__(self, options: SumoOptions, gui: bool = False) -> None:
-        import sumolib
-
-        traci = own_traci()
-        errors = (traci.TraCIException, traci.FatalTraCIError)
+        traci, _ = traci_started(options.arguments(), options.net, gui)
         super().__init__(traci, RawCalls(traci.vehicle.setSpeed, traci.vehicle.getLanePosition))
-        command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *options.arguments()]
-        if gui:
-            command += ["--start", "--quit-on-end", "--window-size", "1200,500"]
-        with redirect_stdout(sys.stderr):  # traci prints its attempts to connect
-            _open(lambda: traci.start(command, stdout=sys.stderr), options, errors)
 
     def follow(self, car: str) -> None:
         """Let the view of sumo-gui follow a car."""
@@ -233,9 +223,39 @@ def connection_kept() -> Iterator[None]:
         raise UserError(f"SUMO has ended before the case was over: {error}") from None
 
 
-def _open(start: Callable[[], object], options: SumoOptions, errors: tuple[type[Exception], ...]) -> None:
+Errors = tuple[type[Exception], ...]
+
+
+def libsumo_started(arguments: Sequence[str], file: Path) -> tuple[Any, Errors]:
+    """Start SUMO inside this process and return its module, and the errors that it raises.
+
+    Raises:
+        UserError: SUMO does not start; the line begins with `file`.
+    """
+    import libsumo
+
+    errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
+    _start(lambda: libsumo.start(["sumo", *arguments]), file, errors)
+    return libsumo, errors
+
+
+def traci_started(arguments: Sequence[str], file: Path, gui: bool = False) -> tuple[Any, Errors]:
+    """The same with SUMO, or sumo-gui, in a process of its own."""
+    import sumolib
+
+    traci = own_traci()
+    errors = (traci.TraCIException, traci.FatalTraCIError)
+    command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *arguments]
+    if gui:
+        command += ["--start", "--quit-on-end", "--window-size", "1200,500"]
+    with redirect_stdout(sys.stderr):  # traci prints its attempts to connect
+        _start(lambda: traci.start(command, stdout=sys.stderr), file, errors)
+    return traci, errors
+
+
+def _start(start: Callable[[], object], file: Path, errors: Errors) -> None:
     try:
         start()
     except errors as error:
         reason = str(error).strip().splitlines()
-        raise UserError(f"{options.net}: SUMO cannot start: {reason[-1] if reason else 'no reason given'}") from None
+        raise UserError(f"{file}: SUMO cannot start: {reason[-1] if reason else 'no reason given'}") from None

@@ -152,6 +152,15 @@ class Ramp:
         own = tuple(section.edge for section in self.ramp if section.end <= 0.0)
         return own + tuple(section.edge for section in self.main if section.start >= 0.0)
 
+    def lanes_of(self, edge: str) -> tuple[str, ...]:
+        """SUMO ids of an edge's lanes, from the right."""
+        return tuple(str(lane.getID()) for lane in read_net(self.net).getEdge(edge).getLanes())
+
+    def next_edges(self, edge: str, lane: int) -> tuple[str, ...]:
+        """Where a lane leads to: edge ids, sorted."""
+        outgoing = read_net(self.net).getEdge(edge).getLane(lane).getOutgoing()
+        return tuple(sorted({str(link.getTo().getID()) for link in outgoing}))
+
     def host_lane_on(self, edge: str) -> int:
         """SUMO index of the host's lane on an edge of the main road."""
         for section in self.main:

@@ -44,10 +44,10 @@ def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) 
         parameters = {ROLE: role} | ({MERGE_POSITION: _number(merge_position)} if role == "merging" else {})
         look = {"length": _number(length[row]), "color": COLORS[role]}
         types.append(
-            _element(
+            element(
                 "vType",
                 {"id": role, **look, "minGap": "0", "sigma": "0", "speedDev": "0"},
-                *(_element("param", {"key": key, "value": value}) for key, value in parameters.items()),
+                *(element("param", {"key": key, "value": value}) for key, value in parameters.items()),
             )
         )
         start = {
@@ -56,26 +56,38 @@ def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) 
             "departSpeed": _number(speed[row]),
         }
         cars.append(
-            _element(
+            element(
                 "vehicle",
                 {"id": role, "type": role, "depart": "0", **start, "insertionChecks": "none"},
-                _element("route", {"edges": " ".join(route[route.index(where.edge) :])}),
+                element("route", {"edges": " ".join(route[route.index(where.edge) :])}),
             )
         )
-    _write(folder / "encounter.rou.xml", _element("routes", {}, *types, *cars))
-    shown = copy_view(ramp.net.parent, folder)
-    options = {
-        "input": {"net-file": ramp.net.name, "route-files": "encounter.rou.xml"},
-        "gui_only": {"gui-settings-file": VIEW} if shown else {},
-        "time": {"begin": "0", "step-length": _number(DT)},
-        "processing": {"time-to-teleport": "-1", "collision.action": "warn", "no-internal-links": "true"},
-    }
-    parts = [_element(part, {}, *(_element(k, {"value": v}) for k, v in of.items())) for part, of in options.items()]
-    _write(folder / "encounter.sumocfg", _element("configuration", {}, *parts))
+    write_xml(folder / "encounter.rou.xml", element("routes", {}, *types, *cars))
+    inputs = {"net-file": ramp.net.name, "route-files": "encounter.rou.xml"}
+    write_xml(folder / "encounter.sumocfg", configuration(inputs, {}, copy_view(ramp.net.parent, folder), {}))
     return folder / "encounter.sumocfg"
 
 
-def _element(tag: str, attributes: dict[str, str], *children: etree._Element) -> etree._Element:
+def configuration(
+    inputs: dict[str, str], processing: dict[str, str], with_view: bool, time: dict[str, str]
+) -> etree._Element:
+    """A SUMO configuration with our conditions; further options by section."""
+    options = {
+        "input": inputs,
+        "gui_only": {"gui-settings-file": VIEW} if with_view else {},
+        "time": {"begin": "0", **time, "step-length": _number(DT)},
+        "processing": {
+            "time-to-teleport": "-1",
+            "collision.action": "warn",
+            "no-internal-links": "true",
+            **processing,
+        },
+    }
+    parts = [element(part, {}, *(element(k, {"value": v}) for k, v in of.items())) for part, of in options.items()]
+    return element("configuration", {}, *parts)
+
+
+def element(tag: str, attributes: dict[str, str], *children: etree._Element) -> etree._Element:
     """An XML element with its children."""
     element = etree.Element(tag, attributes)
     element.extend(children)
@@ -87,5 +99,6 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
-def _write(path: Path, root: etree._Element) -> None:
+def write_xml(path: Path, root: etree._Element) -> None:
+    """Write an XML file."""
     path.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))

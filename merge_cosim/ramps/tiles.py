@@ -21,7 +21,7 @@ def tile_id(tile: int, name: str) -> str:
     return f"t{tile}.{name}"
 
 
-def tile_net(ramp: Ramp, count: int) -> Path:
+def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
     """Return a net with `count` unconnected copies of a ramp, from the cache or newly made.
 
     Every id carries the prefix of `tile_id`. A copy holds only what an encounter can use, because SUMO's step costs
@@ -32,17 +32,32 @@ def tile_net(ramp: Ramp, count: int) -> Path:
     Args:
         ramp: The ramp to copy.
         count: Number of tiles, at least 1.
+        whole: Keep all edges and lanes, and the right of way, for a scene with other traffic.
     """
     source = ramp.net.read_bytes()
-    ingredients = source + repr((ramp.main, ramp.ramp, count)).encode() + Path(__file__).read_bytes()
+    ingredients = source + repr((ramp.main, ramp.ramp, count, whole)).encode() + Path(__file__).read_bytes()
     key = hashlib.sha256(ingredients).hexdigest()[:16]
     target = cache_folder("tiles") / f"{ramp.name}-{count}-{key}.net.xml"
     if not target.is_file():
         net = etree.fromstring(source, etree.XMLParser(remove_blank_text=True, remove_comments=True))
-        _reduce(net, ramp)
+        _leave_out_internal(net)
+        if not whole:
+            _reduce(net, ramp)
         _multiply(net, count)
         write_atomically(target, etree.tostring(net, xml_declaration=True, encoding="UTF-8", pretty_print=True))
     return target
+
+
+def _leave_out_internal(net: etree._Element) -> None:
+    """Take out of a net the lanes inside junctions."""
+    for kind in ("edge", "junction", "connection"):
+        for part in net.findall(kind):
+            if (part.get("id") or part.get("from") or "").startswith(":"):  # so SUMO calls what lies in a junction
+                net.remove(part)
+    for node in net.findall("junction"):
+        node.set("intLanes", "")
+    for link in net.findall("connection"):
+        link.attrib.pop("via", None)
 
 
 def _reduce(net: etree._Element, ramp: Ramp) -> None:
@@ -67,7 +82,6 @@ def _reduce(net: etree._Element, ramp: Ramp) -> None:
             net.remove(node)
             continue
         node.set("incLanes", " ".join(lane for lane in node.get("incLanes", "").split() if lane in lanes))
-        node.set("intLanes", "")
         if node.get("type") != "dead_end":
             node.set("type", "unregulated")
         for request in node.findall("request"):
@@ -76,8 +90,6 @@ def _reduce(net: etree._Element, ramp: Ramp) -> None:
         ends = {f"{link.get('from')}_{link.get('fromLane')}", f"{link.get('to')}_{link.get('toLane')}"}
         if not ends <= lanes:
             net.remove(link)
-        elif "via" in link.attrib:
-            del link.attrib["via"]
 
 
 def _multiply(net: etree._Element, count: int) -> None:

@@ -1,0 +1,254 @@
+"""A method at the wheel of every host of a running SUMO, which drives all other cars."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from merge_cosim.control.acc import Acc
+from merge_cosim.control.law import FollowingLaw
+from merge_cosim.cosim.loop import Driver
+from merge_cosim.cosim.scenes.lanes import Part, RampLanes
+from merge_cosim.cosim.scenes.meetings import Attention, Ending, Meeting
+from merge_cosim.cosim.scenes.notes import Event, Notes
+from merge_cosim.cosim.scenes.roster import Actor, Roster
+from merge_cosim.observation import Observation, Setting
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.streams import stream_keys
+from merge_cosim.units import FloatArray
+
+SIGHT = 150.0
+"""How far a host sees its leader and its follower in its lane [m]."""
+MARGIN = 0.1
+"""A car that is past the usual merging point and has not merged is taken to merge this far ahead of it [m]."""
+STANDING = 0.1
+"""Below this speed a merging car counts as stopped [m/s]."""
+_NOBODY = np.array([[-1e3], [10.0], [-1e3], [10.0], [5.0], [5.0]])
+"""State in the rows of the batch that hold no meeting: far away, and finite."""
+
+
+class HostController:
+    """Observes, estimates and commands once per cycle, between two steps of SUMO.
+
+    Every (host, merging car) in each other's sight is a *meeting* and has a row in the method's batch. A host drives by
+    the smallest of the accelerations that its controller gives for its meetings, the law of following its leader in the
+    lane, and free driving.
+
+    Where a car will merge is not known before it does: station 0 is the ramp's usual merging point, and once the car is
+    past it, just ahead of it; from the lane change on it is where it changed.
+
+    Attributes:
+        finished: The meetings that are over, in the order of their end.
+        notes: What went on.
+    """
+
+    def __init__(
+        self,
+        api: Any,
+        ramp: Ramp,
+        driver: Driver,
+        setting: Setting,
+        attention: Attention = Attention(),
+        horizon: float = 4.0,
+        seed: int = 0,
+        host: str = "",
+        capacity: int = 64,
+    ) -> None:
+        """Take the wheel.
+
+        Args:
+            api: The module libsumo or traci, or a connection of traci; a simulation runs behind it.
+            ramp: The ramp whose net, or copies of it, is loaded.
+            driver: The method.
+            setting: The speed that a host drives at if nobody hinders it, and the cycle.
+            attention: Which merging cars a host attends to.
+            horizon: A meeting lasts until both cars have been past the place of the lane change for this long [s].
+            seed: Seed of the methods' random streams.
+            host: A vehicle or type that is a host without saying so.
+            capacity: Meetings at a time; further ones are noted and left out.
+        """
+        self._api, self._ramp, self._driver, self._setting = api, ramp, driver, setting
+        self._attention, self._capacity, self._seed = attention, capacity, seed
+        self._horizon = round(horizon / setting.dt)
+        controller = driver.controller
+        self._law: FollowingLaw = controller if isinstance(controller, FollowingLaw) else Acc()
+        driver.estimator.start(capacity, setting)
+        controller.start(capacity, setting)
+        self._roster = Roster(api, RampLanes(ramp), host)
+        self._open: dict[int, Meeting] = {}
+        self._met: dict[str, set[str]] = {}
+        self._free_rows = list(range(capacity))[::-1]
+        self._seen = np.tile(_NOBODY, capacity)
+        self._cycle = 0
+        self.finished: list[Meeting] = []
+        self.notes = Notes()
+
+    def cycle(self) -> None:
+        """Observe what the last step did, and command the next one."""
+        self._roster.update()
+        self._note_events()
+        self._end_meetings()
+        self._begin_meetings()
+        hosts = list(self._roster.hosts.values())
+        wanted, ahead, behind = self._by_leader(hosts)
+        if self._open:
+            rows = np.fromiter(self._open, np.int64)
+            log_odds, acceleration = self._by_meetings()
+            self._record(log_odds, ahead, behind)
+            for row, value in zip(rows.tolist(), acceleration[rows].tolist(), strict=True):
+                name = self._open[row].host.name
+                wanted[name] = min(wanted[name], value)
+        vehicle, dt = self._api.vehicle, self._setting.dt
+        for host in hosts:
+            vehicle.setSpeed(host.name, max(host.speed + wanted[host.name] * dt, 0.0))
+        self._cycle += 1
+
+    @property
+    def host_count(self) -> int:
+        """Hosts that have come in so far."""
+        return self._roster.host_count
+
+    def close(self) -> None:
+        """End the meetings that are still open, and note the hosts that never came in."""
+        for row in list(self._open):
+            self._end(row, Ending.CENSORED if self._open[row].merged_at >= 0 else Ending.NOT_NEXT)
+        for name in self._api.simulation.getPendingVehicles():
+            if self._roster.role(name) == "host":
+                line = f"host {name} never departed: no room where it was to enter"
+                self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
+
+    def _by_leader(self, hosts: list[Actor]) -> tuple[dict[str, float], dict[str, list[float]], dict[str, float]]:
+        """By each host's name: acceleration behind its leader [m/s^2]; the leader's gap and speed; the follower's gap.
+
+        SUMO's gaps leave out the minimum gap of the car behind; here they are from bumper to bumper.
+        """
+        vehicle = self._api.vehicle
+        ahead, behind = {}, {}
+        for host in hosts:
+            name, gap = vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
+            ahead[host.name] = [gap + host.min_gap, vehicle.getSpeed(name)] if name else [math.inf, 0.0]
+            name, gap = vehicle.getFollower(host.name, SIGHT)
+            behind[host.name] = gap + vehicle.getMinGap(name) if name else math.inf
+        speed = np.array([host.speed for host in hosts])
+        gap, leader_speed = np.array(list(ahead.values())).reshape(-1, 2).T
+        free = self._law.free(speed, self._setting.speed_limit)
+        led = np.isfinite(gap)
+        keep = self._law.follow(np.where(led, gap, 0.0), speed, leader_speed)
+        wanted = self._law.clip(np.where(led, np.minimum(keep, free), free))
+        return dict(zip(ahead, wanted.tolist(), strict=True)), ahead, behind
+
+    def _by_meetings(self) -> tuple[FloatArray, FloatArray]:
+        """Log-odds and accelerations [m/s^2] of all rows, shape (capacity,) each."""
+        for row, meeting in self._open.items():
+            host, merging = meeting.host, meeting.merging
+            point = self._merging_point(meeting)
+            self._seen[:4, row] = host.x - point, host.speed, merging.x - point, merging.speed
+        seen = Observation(*self._seen)
+        log_odds = self._driver.estimator.update(seen)
+        target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
+        return log_odds, self._driver.controller.command(seen, log_odds, target)
+
+    def _merging_point(self, meeting: Meeting) -> float:
+        if meeting.merged_at >= 0:
+            return meeting.merge_position
+        return max(self._ramp.merging_point, meeting.merging.x + MARGIN)
+
+    def _record(self, log_odds: FloatArray, ahead: dict[str, list[float]], behind: dict[str, float]) -> None:
+        contact = set(self._api.simulation.getCollidingVehiclesIDList())
+        for row, meeting in self._open.items():
+            host, merging = meeting.host, meeting.merging
+            touching = host.name in contact and merging.name in contact
+            state = (host.x, host.speed, merging.x, merging.speed, log_odds[row], log_odds[row] >= 0.0)
+            meeting.states.append(np.array([*state, *ahead[host.name], behind[host.name], touching]))
+            meeting.stopped |= meeting.merged_at < 0 and merging.speed < STANDING
+
+    def _end_meetings(self) -> None:
+        """Take in lane changes, and end what is over."""
+        present = self._roster
+        for row, meeting in list(self._open.items()):
+            host, merging = meeting.host, meeting.merging
+            here = host.name in present.hosts and merging.name in present.merging and host.is_on(Part.HOST)
+            if meeting.merged_at >= 0:
+                if not here or not merging.is_on(Part.HOST):
+                    self._end(row, Ending.CENSORED)
+                elif meeting.both_at < 0 and host.x >= meeting.merge_position:
+                    meeting.both_at = len(meeting.states)
+                elif 0 <= meeting.both_at < len(meeting.states) - self._horizon:
+                    self._end(row, Ending.SCORED)
+            elif here and merging.is_on(Part.HOST):
+                if self._next_to_each_other(host, merging):
+                    meeting.merged_at, meeting.merge_position = len(meeting.states), merging.x
+                else:
+                    self._end(row, Ending.NOT_NEXT)
+            elif not here or not merging.is_on(Part.MERGING) or abs(host.x - merging.x) > 2 * self._attention.apart:
+                self._end(row, Ending.NOT_NEXT)
+        open_now = {meeting.merging.name for meeting in self._open.values()}
+        for name, merging in list(present.merging.items()):
+            if not merging.is_on(Part.MERGING) and name not in open_now:
+                present.forget(name)
+
+    def _next_to_each_other(self, host: Actor, merging: Actor) -> bool:
+        """No car is between the two, which are in one lane."""
+        leader = self._api.vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
+        return merging.name in (leader[0], self._api.vehicle.getFollower(host.name, SIGHT)[0])
+
+    def _end(self, row: int, ending: Ending) -> None:
+        meeting = self._open.pop(row)
+        meeting.ending = ending
+        self._seen[:, row] = _NOBODY[:, 0]
+        self._free_rows.append(row)
+        self.finished.append(meeting)
+
+    def _begin_meetings(self) -> None:
+        for host, merging in self._in_sight():
+            met = self._met.setdefault(merging.name, set())
+            if host.name in met:
+                continue
+            met.add(host.name)
+            if not self._free_rows:
+                line = f"host {host.name} and merging car {merging.name}: no room for more meetings at a time"
+                self.notes.add(Event.NO_ROOM, f"{host.name} {merging.name}", line)
+                continue
+            row = self._free_rows.pop()
+            others = [one.host.name for one in self._open.values() if one.merging is merging]
+            if others:
+                line = f"merging car {merging.name} meets two hosts at once, {others[0]} and {host.name}"
+                self.notes.add(Event.TWO_HOSTS, merging.name, line)
+            self._open[row] = Meeting(host, merging, self._cycle)
+            self._seen[4:, row] = host.length, merging.length
+            rows = np.array([row])
+            keys = stream_keys(np.array([f"{host.name} {merging.name}"]), self._seed)
+            self._driver.estimator.reset(rows, np.array([-1]), keys)
+            self._driver.controller.reset(rows)
+
+    def _in_sight(self) -> Iterator[tuple[Actor, Actor]]:
+        attention, ramp = self._attention, self._ramp
+        first, last = ramp.merging_point - attention.upstream, ramp.ramp[-1].end
+        waiting = [car for car in self._roster.merging.values() if car.is_on(Part.MERGING) and car.x >= first]
+        for host in self._roster.hosts.values():
+            if not host.is_on(Part.HOST):
+                if host.is_on(Part.BESIDE):
+                    line = f"host {host.name} drives beside the host lane, where it meets nobody"
+                    self.notes.add(Event.HOST_OFF_LANE, host.name, line)
+                continue
+            if first <= host.x <= last + attention.apart:
+                for merging in waiting:
+                    near = abs(host.x - merging.x) <= attention.apart
+                    if near and host.lane is not None and merging.lane is not None:
+                        if host.lane.copy == merging.lane.copy:
+                            yield host, merging
+
+    def _note_events(self) -> None:
+        simulation = self._api.simulation
+        for name in simulation.getStartingTeleportIDList():
+            self.notes.add(Event.TELEPORT, f"{name} {self._cycle}", f"vehicle {name} was teleported by SUMO")
+        if simulation.getCollidingVehiclesNumber():
+            for contact in simulation.getCollisions():
+                pair = sorted((contact.collider, contact.victim))
+                of_host = any(name in self._roster.hosts for name in pair)
+                event = Event.HOST_CONTACT if of_host else Event.OTHER_CONTACT
+                line = f"SUMO reports a contact of {pair[0]} and {pair[1]} on lane {contact.lane}"
+                self.notes.add(event, " ".join(pair), line)

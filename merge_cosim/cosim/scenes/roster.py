@@ -1,0 +1,108 @@
+"""Who is in a scene: the hosts, and the cars that are yet to merge, as SUMO has them in every cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from merge_cosim.cosim.loop import DECIMALS
+from merge_cosim.cosim.scenes.lanes import Part, RampLane, RampLanes
+from merge_cosim.cosim.session import LANE_CHANGE_MODE_NONE, SPEED_MODE_UNCHECKED
+from merge_cosim.ramps.routes import ROLE
+
+
+@dataclass
+class Actor:
+    """A host or a merging car.
+
+    Attributes:
+        name: SUMO's vehicle id.
+        length: Its length [m].
+        min_gap: SUMO's minimum gap of it [m], which SUMO takes off the gaps that it reports.
+        lane: Where it drives, None off the ramp.
+        x: Its front bumper [m past the gore].
+        speed: Its speed [m/s].
+    """
+
+    name: str
+    length: float
+    min_gap: float
+    lane: RampLane | None = None
+    x: float = 0.0
+    speed: float = 0.0
+
+    def is_on(self, part: Part) -> bool:
+        """Whether it drives on this part of the ramp."""
+        return self.lane is not None and self.lane.part is part
+
+
+class Roster:
+    """Keeps the hosts and the merging cars of a running SUMO.
+
+    A host's type, or the host itself, carries the parameter `merge-cosim.role` = `host`, or is named as `host`. Merging
+    cars carry `merging`; where no type does, they are all cars whose route leads over the on-ramp.
+
+    Attributes:
+        hosts, merging: Those in the net, by SUMO's id; a merging car is forgotten once `forget` says so.
+        host_count: Hosts that have come in so far.
+    """
+
+    def __init__(self, api: Any, lanes: RampLanes, host: str = "") -> None:
+        self._api = api
+        self._lanes = lanes
+        self._host = host
+        self._role_of_type: dict[str, str] = {}
+        self.hosts: dict[str, Actor] = {}
+        self.merging: dict[str, Actor] = {}
+        self.host_count = 0
+        self._roles_merging = any(self._type_role(kind) == "merging" for kind in api.vehicletype.getIDList())
+        for name in api.vehicle.getIDList():
+            self._enter(name)
+
+    def update(self) -> None:
+        """Take in who came and who left in the last step, and where all are."""
+        simulation = self._api.simulation
+        for name in simulation.getArrivedIDList():
+            self.hosts.pop(name, None)
+            self.merging.pop(name, None)
+        for name in simulation.getDepartedIDList():
+            self._enter(name)
+        vehicle, lanes = self._api.vehicle, self._lanes
+        for actors in (self.hosts, self.merging):
+            for actor in actors.values():
+                actor.lane = lane = lanes[vehicle.getLaneID(actor.name)]
+                actor.speed = round(vehicle.getSpeed(actor.name), DECIMALS)
+                if lane is not None:
+                    actor.x = round(lane.start + vehicle.getLanePosition(actor.name), DECIMALS)
+
+    def forget(self, merging: str) -> None:
+        """Watch a merging car no longer."""
+        self.merging.pop(merging, None)
+
+    def role(self, name: str) -> str:
+        """`host`, `merging` or nothing."""
+        kind = self._api.vehicle.getTypeID(name)
+        if self._host and self._host in (name, kind):
+            return "host"
+        own = self._api.vehicle.getParameter(name, ROLE) or self._type_role(kind)
+        if own or self._roles_merging:
+            return str(own)
+        return "merging" if self._lanes.comes_by_ramp(self._api.vehicle.getRoute(name)) else ""
+
+    def _enter(self, name: str) -> None:
+        role, vehicle = self.role(name), self._api.vehicle
+        if role not in ("host", "merging"):
+            return
+        actor = Actor(name, vehicle.getLength(name), vehicle.getMinGap(name))
+        if role == "merging":
+            self.merging[name] = actor
+            return
+        self.hosts[name] = actor
+        self.host_count += 1
+        vehicle.setSpeedMode(name, SPEED_MODE_UNCHECKED)
+        vehicle.setLaneChangeMode(name, LANE_CHANGE_MODE_NONE)
+
+    def _type_role(self, kind: str) -> str:
+        if kind not in self._role_of_type:
+            self._role_of_type[kind] = self._api.vehicletype.getParameter(kind, ROLE)
+        return self._role_of_type[kind]

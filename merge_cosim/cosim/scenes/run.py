@@ -1,0 +1,169 @@
+"""One scene from its SUMO configuration to scored meetings and facts about the traffic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from merge_cosim.cosim.loop import Driver, Effort
+from merge_cosim.cosim.scenes.controller import HostController
+from merge_cosim.cosim.scenes.meetings import Attention, Meeting
+from merge_cosim.cosim.scenes.scoring import to_be_scored
+from merge_cosim.cosim.session import SumoOptions, libsumo_started, traci_started
+from merge_cosim.errors import UserError
+from merge_cosim.observation import Setting
+from merge_cosim.ramps.ramp import Ramp
+
+HOUR = 3600.0
+"""Seconds per hour."""
+_STATISTICS = {
+    "vehicles": "stats.vehicles.inserted",
+    "waiting": "stats.vehicles.waiting",
+    "emergency_brakings": "stats.safety.emergencyBraking",
+    "mean_speed": "device.tripinfo.speed",
+    "time_loss_s": "device.tripinfo.timeLoss",
+}
+"""What SUMO counts of a scene: cars that came in, and that wait outside; hard brakings of its own cars; and of the cars
+that have left the net, their mean speed [m/s] and what they lost against free driving [s]."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A simulation to be run.
+
+    Attributes:
+        name: Its name in results.
+        file: The `.sumocfg`.
+        ramp: The ramp whose net, or copies of it, it loads.
+        seed: SUMO's seed.
+        end: Its end [s]; inf for when the last car has left.
+        warm_up: The throughput is counted from here on [s].
+        host: A vehicle or type that is a host without saying so.
+        attention: Which merging cars a host attends to.
+        capacity: Meetings at a time.
+    """
+
+    name: str
+    file: Path
+    ramp: Ramp
+    seed: int
+    end: float
+    warm_up: float = 0.0
+    host: str = ""
+    attention: Attention = Attention()
+    capacity: int = 64
+
+
+@dataclass
+class SceneRun:
+    """What came out of a scene.
+
+    Attributes:
+        meetings: All meetings.
+        facts: Counts and means of its traffic.
+        notes: What its user should know, a line each.
+        effort: What it cost.
+    """
+
+    meetings: list[Meeting]
+    facts: dict[str, float]
+    notes: list[str]
+    effort: Effort
+
+
+def run_scene(
+    scene: Scene,
+    driver: Driver,
+    setting: Setting,
+    horizon: float,
+    gui_delay: int | None = None,
+    extra: tuple[str, ...] = (),
+) -> SceneRun:
+    """Run a scene, its hosts driven by a method.
+
+    Args:
+        scene: The scene.
+        driver: The method.
+        setting: Speed of free driving and cycle.
+        horizon: How long a meeting goes on once both cars are past the place of the lane change [s].
+        gui_delay: Milliseconds per step in sumo-gui; None runs without a window.
+        extra: Further options of SUMO.
+
+    Raises:
+        UserError: SUMO refuses the configuration, at its start or on the way.
+    """
+    with _running_sumo(scene, gui_delay, extra) as api:
+        begin = perf_counter()
+        controller = HostController(
+            api,
+            scene.ramp,
+            driver,
+            setting,
+            scene.attention,
+            horizon,
+            scene.seed,
+            scene.host,
+            scene.capacity,
+        )
+        effort = Effort()
+        simulation, count, arrived, time = api.simulation, api.vehicle.getIDCount, 0, 0.0
+        while time < scene.end and simulation.getMinExpectedNumber() > 0:
+            before = perf_counter()
+            api.simulationStep()
+            stepped = perf_counter()
+            controller.cycle()
+            effort.step_s += stepped - before
+            effort.method_s += perf_counter() - stepped
+            effort.vehicle_steps += count()
+            time = simulation.getTime()
+            if time > scene.warm_up:
+                arrived += simulation.getArrivedNumber()
+        controller.close()
+        effort.wall_s = perf_counter() - begin
+        effort.encounter_cycles = sum(len(meeting.states) for meeting in controller.finished)
+        facts: dict[str, float] = {
+            "simulated_s": time,
+            "throughput_veh_h": round(HOUR * arrived / max(time - scene.warm_up, setting.dt), 1),
+            **{name: float(simulation.getParameter("", key)) for name, key in _STATISTICS.items()},
+            "hosts": controller.host_count,
+            "meetings": len(controller.finished),
+            "meetings_scored": len(to_be_scored(controller.finished)),
+            "merging_stopped": sum(meeting.stopped for meeting in controller.finished),
+            **controller.notes.counts(),
+        }
+        return SceneRun(controller.finished, facts, controller.notes.lines, effort)
+
+
+@contextmanager
+def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...]) -> Iterator[Any]:
+    """SUMO with the scene's configuration, under the conditions that the controller rests on."""
+    conditions = SumoOptions(scene.ramp.net).conditions
+    del conditions["time-to-teleport"]  # the user's, whose teleports are counted
+    options = {
+        "configuration-file": scene.file,
+        **conditions,
+        "no-internal-links": "true",
+        "seed": scene.seed,
+        "device.tripinfo.probability": 1,
+        "no-step-log": "true",
+        "no-warnings": "true",
+        "duration-log.disable": "true",
+        "xml-validation": "never",
+    }
+    words = [str(word) for name, value in options.items() for word in (f"--{name}", value)] + list(extra)
+    if gui_delay is None:
+        api, errors = libsumo_started(words, scene.file)
+    else:
+        words += ["--delay", str(gui_delay)]
+        api, errors = traci_started(words, scene.file, gui=True)
+    try:
+        yield api
+    except errors as error:
+        reason = str(error).strip().splitlines()
+        raise UserError(f"{scene.file}: SUMO stopped: {reason[-1] if reason else 'no reason given'}") from None
+    finally:
+        api.close()
