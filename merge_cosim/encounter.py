@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from functools import cached_property
 
 import numpy as np
 
@@ -153,6 +154,7 @@ class Encounters:
         arrays = {f.name: getattr(self, f.name)[first:last] for f in fields(self) if f.name != "log"}
         return replace(self, **arrays, log=None if self.log is None else self.log.take(np.arange(first, last)))
 
+    @cached_property
     def digest(self) -> str:
         """A short hash of all that the encounters hold."""
         values = [getattr(self, f.name) for f in fields(self)]

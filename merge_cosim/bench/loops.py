@@ -21,7 +21,7 @@ from merge_cosim.control.law import DistanceKeeping
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.plan import SweepRequest, plan
+from merge_cosim.experiments.plan import SweepRequest, plan_encounters
 from merge_cosim.experiments.work import Batch, Workplace, simulate_batch
 from merge_cosim.files import shipped
 from merge_cosim.ramps.ramp import Ramp
@@ -100,10 +100,10 @@ def highway() -> dict[str, float] | None:
 
 
 def _batch(cases: int) -> Batch:
-    (batch,) = plan(SweepRequest([SCENARIO], [METHOD]))
+    (batch,) = plan_encounters(SweepRequest([SCENARIO], [METHOD]))
     n = len(batch.encounters)
     rows = np.linspace(0, n - 1, min(cases, n)).round().astype(np.int64)
-    return Batch(batch.scenario, "", batch.method, None, batch.encounters.take(rows))
+    return Batch(scenario=batch.scenario, method=batch.method, encounters=batch.encounters.take(rows))
 
 
 def _task(batch: Batch, ramp: Ramp, encounters: Encounters) -> dict[str, Any]:

@@ -11,25 +11,30 @@ import pyarrow as pa
 
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.experiments.store import ResultFolder
-from merge_cosim.experiments.work import Batch, Workplace, simulate_batch
+from merge_cosim.experiments.work import Batch, Task, Workplace, simulate_batch
 from merge_cosim.ramps.ramp import Ramp
 
 SINGLE_CASES = 5
 """Cases run one at a time to time a method's update in a batch of one."""
 
 
-def run_alone(batches: Sequence[Batch], results: ResultFolder) -> tuple[dict[str, float], pa.Table]:
+_NO_RECORDS = pd.DataFrame({name: pd.Series(dtype=str) for name in ("scenario", "case", "method")})
+
+
+def run_alone(tasks: Sequence[Task], results: ResultFolder) -> tuple[dict[str, float], pa.Table]:
     """Run a few cases of each scenario and method one at a time, the most telling one first and recorded.
+
+    Scenes are left out: their cases cannot be run alone.
 
     Returns:
         Time of one update in a batch of one [us] by method, and the records of the telling cases.
     """
     telling: dict[str, str] = {}
     efforts: dict[str, Effort] = {}
-    records = []
+    records = [_NO_RECORDS]
     workplace = Workplace(tiles=1)
-    for batch in batches:
-        if batch.variation:
+    for batch in tasks:
+        if batch.variation or not isinstance(batch, Batch):
             continue
         scenario = batch.scenario.name
         if scenario not in telling:

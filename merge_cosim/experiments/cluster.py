@@ -18,7 +18,7 @@ from merge_cosim.errors import UserError
 from merge_cosim.experiments.executors import Finished
 from merge_cosim.experiments.pieces import Handout, Piece
 from merge_cosim.experiments.plan import versions
-from merge_cosim.experiments.work import Batch, Workplace, run_batch
+from merge_cosim.experiments.work import Task, Workplace
 from merge_cosim.files import cache_folder, write_atomically
 from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp, find_ramp
@@ -35,7 +35,7 @@ ONE_THREAD = "libsumo holds one simulation per process; start the workers with: 
 
 @dataclass(frozen=True)
 class Kit:
-    """What a worker elsewhere needs beside the batch, which carries cases, scenario, method and model.
+    """What a worker elsewhere needs beside the task, which carries cases, scenario, method and model.
 
     Attributes:
         versions: What this process runs; a worker that runs anything else is refused.
@@ -82,7 +82,7 @@ class Cluster:
                     if ramp not in kits:
                         kits[ramp] = self._kit(ramp)
                     key = f"merge-cosim-{session}-{piece.name}"
-                    future = client.submit(run_shipped, piece.batch(), kits[ramp], key=key, pure=False)
+                    future = client.submit(run_shipped, piece.task(), kits[ramp], key=key, pure=False)
                     running[future] = piece
                     done.add(future)
 
@@ -148,7 +148,7 @@ _workplace: Workplace | None = None
 _plugins_here: dict[str, str] = {}
 
 
-def run_shipped(batch: Batch, kit: Kit) -> tuple[pa.Table, Effort]:
+def run_shipped(task: Task, kit: Kit) -> tuple[pa.Table, Effort]:
     """What a Dask worker does with a piece: check, unpack, run; its SUMO stays open for the next one.
 
     Raises:
@@ -164,7 +164,8 @@ def run_shipped(batch: Batch, kit: Kit) -> tuple[pa.Table, Effort]:
         ramp = _unpack("ramps", kit.ramp, kit.ramp_name)
         if _workplace is None:
             _workplace = Workplace()
-        return run_batch(replace(batch, scenario=batch.scenario.model_copy(update={"ramp": str(ramp)})), _workplace)
+        here = replace(task, scenario=task.scenario.model_copy(update={"ramp": str(ramp)}))
+        return here.run(_workplace)
     finally:
         _at_work.release()
 

@@ -19,7 +19,7 @@ from merge_cosim.cosim.loop import Effort
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.pieces import Handout, Piece
 from merge_cosim.experiments.plan import StartMethod, SweepRequest
-from merge_cosim.experiments.work import Workplace, run_batch
+from merge_cosim.experiments.work import Workplace
 from merge_cosim.registry import load_plugin
 
 MOST_LOSSES = 3
@@ -63,7 +63,7 @@ class InProcess:
         workplace = Workplace()
         try:
             while piece := handout.take():
-                yield Finished(piece, *run_batch(piece.batch(), workplace))
+                yield Finished(piece, *piece.task().run(workplace))
         finally:
             workplace.close()
 
@@ -142,7 +142,7 @@ class _Worker:
         self.piece = piece
         if piece is not None:
             with suppress(OSError):  # it is dead; reading from it will say so
-                self.connection.send(piece.batch())
+                self.connection.send(piece.task())
 
     def stop(self) -> None:
         """End the process: at once if it is at work, else by its own will."""
@@ -164,10 +164,10 @@ def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Pa
     try:
         for plugin in plugins:
             load_plugin(plugin)
-        while (batch := employer.recv()) is not None:
+        while (task := employer.recv()) is not None:
             outcome: object
             try:
-                outcome = run_batch(batch, workplace)
+                outcome = task.run(workplace)
             except Exception as error:
                 outcome = error
             employer.send(outcome)

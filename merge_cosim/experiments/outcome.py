@@ -15,7 +15,7 @@ from merge_cosim.encounter import NEVER, Encounters, Intention
 from merge_cosim.observation import Setting
 from merge_cosim.units import AnyArray, BoolArray, FloatArray
 
-SCHEMA_VERSION = "2"
+SCHEMA_VERSION = "3"
 SCHEMA = pa.schema(
     [
         ("scenario", pa.string()),
@@ -43,6 +43,10 @@ SCHEMA = pa.schema(
         ("min_ttc_s", pa.float64()),
         ("max_drac", pa.float64()),
         ("pet_s", pa.float64()),
+        ("min_leader_gap_m", pa.float64()),
+        ("min_leader_ttc_s", pa.float64()),
+        ("min_follower_gap_m", pa.float64()),
+        ("merging_stopped", pa.bool_()),
         ("delay_s", pa.float64()),
         ("hardest_braking", pa.float64()),
         ("mean_jerk", pa.float64()),
@@ -62,7 +66,14 @@ SCHEMA = pa.schema(
 KEY = [("scenario", "ascending"), ("variation", "ascending"), ("case", "ascending"), ("method", "ascending")]
 
 
-def result_rows(run: Run, encounters: Encounters, setting: Setting, free_law: Acc, names: dict[str, str]) -> pa.Table:
+def result_rows(
+    run: Run,
+    encounters: Encounters,
+    setting: Setting,
+    free_law: Acc,
+    names: dict[str, str],
+    more: Mapping[str, AnyArray | pa.Array] = {},
+) -> pa.Table:
     """Return the result rows of a run.
 
     Args:
@@ -71,6 +82,7 @@ def result_rows(run: Run, encounters: Encounters, setting: Setting, free_law: Ac
         setting: Speed limit and cycle.
         free_law: The controller whose free driving the delay is measured against.
         names: `scenario`, `variation`, `method` and `model` of all rows.
+        more: Further columns, or others in their place, shape (n,) each; the columns of scenes are missing without.
     """
     c, n, dt = run.columns, len(encounters), setting.dt
     failed = c["kind"] > 0
@@ -124,11 +136,14 @@ def result_rows(run: Run, encounters: Encounters, setting: Setting, free_law: Ac
         "end_s": c["end_cycle"] * dt,
         "ambiguity_s": ambiguity,
         "sumo_collision": c["sumo_collision"].astype(bool),
+        **more,
     }
     arrays = []
     for column in SCHEMA:
         if column.name in names:
             arrays.append(pa.array([names[column.name]] * n, column.type))
+        elif column.name not in columns:
+            arrays.append(pa.nulls(n, column.type))
         elif isinstance(columns[column.name], pa.Array):
             arrays.append(columns[column.name])
         else:

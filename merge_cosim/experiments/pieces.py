@@ -1,38 +1,29 @@
-"""Batches cut into pieces, and the order in which the pieces are handed out."""
+"""Tasks cut into pieces, and the order in which the pieces are handed out."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from merge_cosim.cosim.loop import Effort
-from merge_cosim.cosim.scoring import Rules
-from merge_cosim.encounter import Encounters
-from merge_cosim.experiments.work import Batch
-from merge_cosim.units import DT, FloatArray
-
-PIECE_CASES = 1_000
-"""Most cases of one piece: enough to keep the tiles busy, few enough to lose little when interrupted."""
-USUAL_ACCELERATION = 1.0
-"""Acceleration [m/s^2] by which the length of a case is guessed."""
-
+from merge_cosim.experiments.work import Task
 
 @dataclass(frozen=True)
 class Piece:
     """A stretch of a batch's cases: what is handed to a process, and stored, as a whole.
 
     Attributes:
-        name: Number of the batch and of the piece in it; the same in every run of the sweep.
-        whole: The batch.
+        name: Number of the task and of the piece in it; the same in every run of the sweep.
+        whole: The whole of it.
         first, last: The cases `first` to `last - 1`.
         cycles: Expected cycles of all its cases.
     """
 
     name: str
-    whole: Batch
+    whole: Task
     first: int
     last: int
     cycles: float
@@ -40,42 +31,22 @@ class Piece:
     def __len__(self) -> int:
         return self.last - self.first
 
-    def batch(self) -> Batch:
-        """The stretch as a batch of its own; made only now, so that a million cases are not held twice."""
-        return replace(self.whole, encounters=self.whole.encounters.part(self.first, self.last), left_out=())
+    def task(self) -> Task:
+        """The stretch as a task of its own."""
+        return self.whole.part(self.first, self.last)
 
     def __str__(self) -> str:
-        cases = self.whole.encounters.case
-        return (
-            f"{self.whole.scenario.name}, {self.whole.method.name}, cases {cases[self.first]} to {cases[self.last - 1]}"
-        )
+        first, last = self.whole.case(self.first), self.whole.case(self.last - 1)
+        return f"{self.whole.scenario.name}, {self.whole.method.name}, cases {first} to {last}"
 
 
-def cut(batches: Sequence[Batch], most: int = PIECE_CASES) -> Iterator[Piece]:
-    """Cut batches into pieces of at most `most` cases, as even as can be."""
-    cycles: dict[tuple[int, Rules], FloatArray] = {}
-    for number, batch in enumerate(batches):
-        key = (id(batch.encounters), batch.scenario.test)
-        if key not in cycles:
-            cycles[key] = np.concatenate([[0.0], np.cumsum(expected_cycles(batch.encounters, batch.scenario.test))])
-        n = len(batch.encounters)
-        ends = np.linspace(0, n, -(-n // most) + 1).astype(np.int64)
+def cut(tasks: Sequence[Task], most: int | None = None) -> Iterator[Piece]:
+    """Cut tasks into pieces of at most `most` cases (None: each task's own), as even as can be."""
+    for number, task in enumerate(tasks):
+        cycles = np.concatenate([[0.0], np.cumsum(task.cycles())])
+        ends = np.linspace(0, len(task), -(-len(task) // (most or task.most)) + 1).astype(np.int64)
         for piece, (first, last) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)):
-            expected = float(cycles[key][last] - cycles[key][first])
-            yield Piece(f"{number:04d}-{piece:05d}", batch, first, last, expected)
-
-
-def expected_cycles(encounters: Encounters, rules: Rules) -> FloatArray:
-    """Rough length of each case: both cars accelerate to the merging point, then it is scored; shape (n,)."""
-    arrivals = [
-        (np.sqrt(speed**2 + 2 * USUAL_ACCELERATION * np.maximum(-station, 0.0)) - speed) / USUAL_ACCELERATION
-        for station, speed in (
-            (encounters.host_station, encounters.host_speed),
-            (encounters.merging_station, encounters.merging_speed),
-        )
-    ]
-    expected: FloatArray = np.minimum(np.maximum(*arrivals) + rules.horizon, rules.time_out) / DT
-    return expected
+            yield Piece(f"{number:04d}-{piece:05d}", task, first, last, float(cycles[last] - cycles[first]))
 
 
 class Handout:

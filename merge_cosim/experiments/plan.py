@@ -1,4 +1,4 @@
-"""From what the user asked for to what there is to run: one batch per (scenario, variation, method)."""
+"""From what the user asked for to what there is to run: one task per (scenario, variation, method)."""
 
 from __future__ import annotations
 
@@ -23,12 +23,16 @@ from merge_cosim.experiments.methods import (
     methods_for,
     split_settings,
 )
-from merge_cosim.experiments.scenario import Scenario, load_scenario
+from merge_cosim.experiments.scenario import Routes, Scenario, Traffic, load_scenario
+from merge_cosim.experiments.scenes import SceneBatch
 from merge_cosim.experiments.sources import SourceChoice, load_encounters
 from merge_cosim.experiments.statistics.comparison import reference_of
-from merge_cosim.experiments.work import Batch
+from merge_cosim.experiments.statistics.summary import TRAFFIC
+from merge_cosim.experiments.work import Batch, Task
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.route_reader import Configuration
+from merge_cosim.ramps.routes import ROLE
 from merge_cosim.registry import load_plugin
 from merge_cosim.units import IntArray
 
@@ -70,8 +74,8 @@ class SweepRequest:
     against: str | None = None
 
 
-def plan(request: SweepRequest) -> list[Batch]:
-    """Work out what to run, one batch per (scenario, variation, method); all mistakes of the user show here.
+def plan(request: SweepRequest) -> list[Task]:
+    """Work out what to run, one task per (scenario, variation, method); all mistakes of the user show here.
 
     Raises:
         UserError: Something asked for does not exist or does not fit.
@@ -79,7 +83,7 @@ def plan(request: SweepRequest) -> list[Batch]:
     for plugin in request.plugins:
         load_plugin(plugin)
     loaded: dict[str, Encounters] = {}
-    batches: list[Batch] = []
+    tasks: list[Task] = []
     for varied, values in [("", [None]), *request.variations]:
         for value in values:
             settings = request.settings | ({varied: value} if varied else {})
@@ -87,22 +91,38 @@ def plan(request: SweepRequest) -> list[Batch]:
             methods = _methods(request.methods, of_components)
             if varied in of_components:
                 methods = [one for one in methods if varied.partition(".")[0] in (one.estimator, one.controller)]
+            label = f"{varied}={value}" if varied else ""
             for scenario in _scenarios(request.scenarios, of_scenario, varied):
+                if scenario.is_scene:
+                    tasks += _scene_batches(scenario, label, methods, request)
+                    continue
                 key = scenario.encounters_key
                 if key not in loaded:
                     loaded[key] = _by_name(load_encounters(scenario, request.data, request.source))
-                label = f"{varied}={value}" if varied else ""
-                batches += _scenario_batches(scenario, label, methods, loaded[key], request)
-    if not batches:
+                tasks += _encounter_batches(scenario, label, methods, loaded[key], request)
+    if not tasks:
         raise UserError("nothing to run: no method fits the scenarios")
-    reference_of(method_names(request, batches), request.against)
-    return batches
+    reference_of(method_names(request, tasks), request.against)
+    return tasks
 
 
-def method_names(request: SweepRequest, batches: Sequence[Batch]) -> list[str]:
+def plan_encounters(request: SweepRequest) -> list[Batch]:
+    """The same for what needs encounters.
+
+    Raises:
+        UserError: See `plan`; or a scenario is living traffic.
+    """
+    tasks = plan(request)
+    for task in tasks:
+        if not isinstance(task, Batch):
+            raise UserError(f"scenario {task.scenario.name}: it is living traffic and has no encounters of its own")
+    return [task for task in tasks if isinstance(task, Batch)]
+
+
+def method_names(request: SweepRequest, tasks: Sequence[Task]) -> list[str]:
     """Names of all methods that will have rows."""
     derived = {ORACLE_BEST} if not request.methods or ORACLE_BEST in request.methods else set()
-    return sorted({batch.method.name for batch in batches} | derived)
+    return sorted({task.method.name for task in tasks} | derived)
 
 
 def _scenarios(names: Sequence[str], settings: dict[str, Any], varied: str) -> list[Scenario]:
@@ -127,18 +147,61 @@ def _methods(names: Sequence[str], settings: dict[str, Any]) -> list[Method]:
     return [Method.parse(name, settings) for name in wanted]
 
 
-def _scenario_batches(
+def _scene_batches(
+    scenario: Scenario, variation: str, methods: list[Method], request: SweepRequest
+) -> Iterator[SceneBatch]:
+    traffic = scenario.encounters
+    assert isinstance(traffic, (Routes, Traffic))
+    if isinstance(traffic, Routes):
+        if request.dask is not None:
+            raise UserError(f"{traffic.file}: route files with traffic run on this machine; leave out --dask")
+        if not traffic.host and not Configuration.read(traffic.file).names_role("host"):
+            raise UserError(
+                f'{traffic.file}: nobody is the host; add <param key="{ROLE}" value="host"/> to a vType, or name a '
+                f"vehicle or type: --set encounters.host=ID"
+            )
+    for method in methods:
+        if method.is_human or method.needs_label:
+            continue
+        yield SceneBatch(
+            scenario=scenario,
+            variation=variation,
+            method=method,
+            model=_model(method, TRAFFIC, request),
+            seed=request.seed,
+            first=0,
+            last=traffic.replications,
+        )
+
+
+def _model(method: Method, source: str, request: SweepRequest) -> IntentionModel | None:
+    """The learned model that a method needs; it is found to fit."""
+    if not method.needs_model:
+        return None
+    model = IntentionModel.load(request.model or default_model(source))
+    method.driver(model)
+    return model
+
+
+def _encounter_batches(
     scenario: Scenario, variation: str, methods: list[Method], encounters: Encounters, request: SweepRequest
 ) -> Iterator[Batch]:
     encounters, left_out = _on_the_ramp(scenario, encounters)
     for source in dict.fromkeys(encounters.source.tolist()):
         chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
         for method in methods_for(chosen, methods):
-            model = IntentionModel.load(request.model or default_model(source)) if method.needs_model else None
+            model = _model(method, source, request)
             if model is not None:
                 _refuse_trained(scenario, chosen, model)
-                method.driver(model)
-            yield Batch(scenario, variation, method, model, chosen, request.seed, left_out)
+            yield Batch(
+                scenario=scenario,
+                variation=variation,
+                method=method,
+                model=model,
+                encounters=chosen,
+                seed=request.seed,
+                left_out=left_out,
+            )
 
 
 def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:
@@ -190,24 +253,21 @@ def versions() -> dict[str, str]:
     }
 
 
-def identity(request: SweepRequest, batches: list[Batch]) -> dict[str, Any]:
+def identity(request: SweepRequest, tasks: list[Task]) -> dict[str, Any]:
     """What makes two sweeps the same: the same rows come out of the same identity."""
-    models = {batch.model.name: batch.model for batch in batches if batch.model}
-    digests = {
-        id(held): held.digest() for held in {id(batch.encounters): batch.encounters for batch in batches}.values()
-    }
+    models = {task.model.name: task.model for task in tasks if task.model}
     return {
         "versions": versions(),
         "seed": request.seed,
-        "methods": sorted({batch.method.name for batch in batches}),
+        "methods": sorted({task.method.name for task in tasks}),
         "settings": {key: str(value) for key, value in request.settings.items()},
         "variations": [[name, [str(value) for value in values]] for name, values in request.variations],
         "models": {name: _digest(model.to_json()) for name, model in models.items()},
         "scenarios": {
-            " ".join(filter(None, (batch.scenario.name, batch.variation))): batch.scenario.model_dump(mode="json")
-            for batch in batches
+            " ".join(filter(None, (task.scenario.name, task.variation))): task.scenario.model_dump(mode="json")
+            for task in tasks
         },
-        "encounters": _digest("".join(digests[id(batch.encounters)] for batch in batches)),
+        "encounters": _digest("".join(task.digest() for task in tasks)),
         "plugins": {plugin.name: hashlib.sha256(plugin.read_bytes()).hexdigest()[:16] for plugin in request.plugins},
     }
 

@@ -21,13 +21,19 @@ from pydantic import (
     model_validator,
 )
 
+from merge_cosim.cosim.scenes.meetings import Attention
 from merge_cosim.cosim.scoring import Rules
 from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
 from merge_cosim.ngsim.rules import PairRules
-from merge_cosim.ramps.route_reader import read_sumocfg
+from merge_cosim.ramps.route_reader import Configuration, only_pairs
 from merge_cosim.registry import did_you_mean, parameters
 from merge_cosim.traffic.base import MergingCar, merging_cars
+from merge_cosim.traffic.demand import Demand
+
+
+BY_SUMO = "sumo"
+"""The merging-car model that stands for SUMO's own models: the scenario is run as scenes."""
 
 
 class _Strict(BaseModel):
@@ -186,12 +192,46 @@ class Drawn(_Strict):
 class Routes(_Strict):
     """Cars of an ordinary SUMO configuration, by the roles of their types.
 
+    What stands below `file` is for scenes (`merging.model` = `sumo`), in which SUMO drives all cars but the hosts.
+
     Attributes:
         file: The `.sumocfg`.
+        replications: Number of scenes, each with a SUMO seed of its own.
+        seed: SUMO's seed of the first one.
+        end: Where a scene ends [s]; 0 for the configuration's own end.
+        host: A vehicle or a type that is a host without saying so.
+        attention: Which merging cars a host attends to.
     """
 
     kind: Literal["routes"]
     file: Path
+    replications: PositiveInt = 1
+    seed: NonNegativeInt = 0
+    end: NonNegativeFloat = 0.0
+    host: str = ""
+    attention: Attention = Attention()
+
+
+class Traffic(_Strict):
+    """Living traffic on the ramp, made from a few numbers and driven by SUMO's own models.
+
+    Attributes:
+        replications: Number of scenes, each with a SUMO seed of its own.
+        seed: SUMO's seed of the first one.
+        demand: Who drives, and how.
+        attention: Which merging cars a host attends to.
+    """
+
+    kind: Literal["traffic"]
+    replications: PositiveInt = 4
+    seed: NonNegativeInt = 0
+    demand: Demand = Demand()
+    attention: Attention = Attention()
+
+    @property
+    def host(self) -> str:
+        """All hosts say so."""
+        return ""
 
 
 class Scenario(_Strict):
@@ -211,7 +251,7 @@ class Scenario(_Strict):
     title: str
     about: str = ""
     ramp: str
-    encounters: Annotated[Grid | Random | Drawn | Pairs | Routes, Field(discriminator="kind")]
+    encounters: Annotated[Grid | Random | Drawn | Pairs | Routes | Traffic, Field(discriminator="kind")]
     merging: dict[str, Any]
     test: Rules = Rules()
     speed_limit: PositiveFloat | None = None
@@ -225,6 +265,19 @@ class Scenario(_Strict):
         """
         values = dict(self.merging)
         return merging_cars.build(str(values.pop("model", "")), values, "[merging]")
+
+    @model_validator(mode="after")
+    def _driven(self) -> Self:
+        if isinstance(self.encounters, Traffic) and not self.is_scene:
+            raise ValueError(f"merging.model must be '{BY_SUMO}' in traffic, which SUMO drives")
+        if self.is_scene and not isinstance(self.encounters, (Traffic, Routes)):
+            raise ValueError(f"merging.model = '{BY_SUMO}' needs encounters of the kind traffic or routes")
+        return self
+
+    @property
+    def is_scene(self) -> bool:
+        """SUMO drives the merging cars, and all others but the hosts."""
+        return self.merging.get("model") == BY_SUMO
 
     @property
     def encounters_key(self) -> str:
@@ -267,10 +320,11 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
         scenario = Scenario.model_validate({"name": file.stem, **document})
     except ValidationError as error:
         raise UserError(f"{file}: {_first_problem(error)}") from None
-    try:
-        scenario.merging_car()
-    except UserError as error:
-        raise UserError(f"{file}: {error}") from None
+    if not scenario.is_scene:
+        try:
+            scenario.merging_car()
+        except UserError as error:
+            raise UserError(f"{file}: {error}") from None
     return scenario
 
 
@@ -282,12 +336,12 @@ def _of_toml(file: Path) -> dict[str, Any]:
 
 
 def _of_sumocfg(file: Path) -> dict[str, Any]:
-    ramp, _ = read_sumocfg(file)
+    configuration = Configuration.read(file)
     return {
         "title": f"Route files of {file.name}",
-        "ramp": str(ramp.net.parent),
+        "ramp": str(configuration.net.parent),
         "encounters": {"kind": "routes", "file": str(file)},
-        "merging": {"model": "designed"},
+        "merging": {"model": "designed" if only_pairs(configuration) else BY_SUMO},
     }
 
 
@@ -300,24 +354,27 @@ def _set(document: dict[str, Any], name: str, value: Any) -> None:
     document[last] = value
 
 
-_KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules]] = {
+_KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules] | type[Demand]] = {
     (): Scenario,
     ("encounters", "grid"): Grid,
     ("encounters", "random"): Random,
     ("encounters", "pairs"): Pairs,
     ("encounters", "drawn"): Drawn,
+    ("encounters", "routes"): Routes,
+    ("encounters", "traffic"): Traffic,
+    ("encounters", "traffic", "demand"): Demand,
     ("encounters", "pairs", "rules"): PairRules,
     ("test",): Rules,
 }
 
 
-_KINDS = "grid, random, pairs, routes"
+_KINDS = "grid, random, drawn, pairs, routes, traffic"
 
 
 def _first_problem(error: ValidationError) -> str:
     first = min(error.errors(), key=lambda one: one["type"] == "missing")  # a misspelt key is missing, too
     *place, key = first["loc"]
-    kinds = ("grid", "random", "drawn", "pairs", "routes", "[key]")
+    kinds = ("grid", "random", "drawn", "pairs", "routes", "traffic", "[key]")
     shown = ".".join(str(part) for part in first["loc"] if part not in kinds)
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         section = _KNOWN.get(tuple(str(part) for part in place), Span)

@@ -16,7 +16,7 @@ from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.plant import SumoPlant
 from merge_cosim.cosim.session import Session, SumoOptions, TraciSession, connection_kept
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.plan import SweepRequest, plan
+from merge_cosim.experiments.plan import SweepRequest, plan_encounters
 from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.routes import write_encounter
@@ -55,7 +55,7 @@ def run_single(
     """
     if trace is not None and trace.suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: --trace writes .csv or .parquet")
-    batch = _case_alone(plan(request), case)
+    batch = _case_alone(plan_encounters(request), case)
     row, record = trace_case(batch, gui_delay, outputs, attach)
     if trace is not None:
         trace.parent.mkdir(parents=True, exist_ok=True)
@@ -107,7 +107,7 @@ def trace_methods(request: SweepRequest, case: str) -> tuple[pd.DataFrame, dict[
         UserError: There is no such case.
     """
     records, failed = [], {}
-    for batch in plan(request):
+    for batch in plan_encounters(request):
         row, record = trace_case(_case_alone([batch], case))
         records.append(record.assign(method=batch.method.name))
         failed[batch.method.name] = bool(row["failed"])
@@ -116,7 +116,7 @@ def trace_methods(request: SweepRequest, case: str) -> tuple[pd.DataFrame, dict[
 
 def export_case(request: SweepRequest, case: str, out: Path) -> Path:
     """Write one case of one scenario as SUMO files into a folder; returns the `.sumocfg`."""
-    batch = _case_alone(plan(request), case)
+    batch = _case_alone(plan_encounters(request), case)
     return write_encounter(out, Ramp.load(batch.scenario.ramp), batch.encounters, 0)
 
 
@@ -130,9 +130,7 @@ def _case_alone(batches: Sequence[Batch], case: str) -> Batch:
     for batch in batches:
         found = np.flatnonzero(batch.encounters.case == case)
         if len(found):
-            return Batch(
-                batch.scenario, batch.variation, batch.method, batch.model, batch.encounters.take(found[:1]), batch.seed
-            )
+            return batch.part(int(found[0]), int(found[0]) + 1)
     names = [str(name) for batch in batches for name in batch.encounters.case]
     few = did_you_mean(case, names) if len(names) <= 12 else f" (such as {names[0]}, {names[-1]})"
     raise UserError(f"scenario {batches[0].scenario.name}: no case '{case}'{few}")

@@ -12,7 +12,7 @@ import numpy as np
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.drawn import drawn_encounters
-from merge_cosim.experiments.scenario import Drawn, Grid, Pairs, Random, Routes, Scenario
+from merge_cosim.experiments.scenario import Drawn, Grid, Pairs, Random, Routes, Scenario, Traffic
 from merge_cosim.ngsim.data import data_files, episode_files, load_trajectories
 from merge_cosim.ngsim.encounters import at_site_point, site_encounters
 from merge_cosim.ngsim.sites import SITES, site
@@ -45,6 +45,8 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
         return replace(encounters, label=scenario.merging_car().intentions(encounters))
     if isinstance(scenario.encounters, Routes):
         return read_sumocfg(scenario.encounters.file)[1]
+    if isinstance(scenario.encounters, Traffic):
+        raise UserError(f"scenario {scenario.name}: it is living traffic and has no encounters of its own")
     parts = [
         _part(pairs_of_site(name, scenario.encounters, data, source), scenario.encounters, part)
         for name, part in scenario.encounters.sites.items()

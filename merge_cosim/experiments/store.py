@@ -16,6 +16,9 @@ import pyarrow.parquet as pq
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.outcome import KEY, SCHEMA, SCHEMA_VERSION
 
+SCENE_FACTS = b"merge_cosim_scenes"
+"""Metadata of a part: the facts of the scenes that its rows come from (JSON)."""
+SCENES_CSV, TRAFFIC_CSV, NOTES_CSV = "scenes.csv", "traffic.csv", "notes.csv"
 STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV = "strata.csv", "belief.csv", "calibration.csv"
 RESULTS, SUMMARY_CSV, SUMMARY_JSON, MANIFEST, TRACES = (
     "results.parquet",
@@ -109,7 +112,7 @@ class ResultFolder:
 
     def _stretches(self) -> Iterator[pa.Table]:
         """All stored rows, scenario by scenario, in stretches of whole cases that follow each other by name."""
-        files = self._parts.glob("*.parquet")
+        files = (file for file in self._parts.glob("*.parquet") if pq.read_metadata(file).num_rows)
         parts = sorted((_Part.of(file) for file in files), key=lambda part: (part.group, part.first, part.file.name))
         for _, group in groupby(parts, key=lambda part: part.group):
             held: list[pa.Table] = []
@@ -124,6 +127,13 @@ class ResultFolder:
                     if pc.any(whole).as_py():
                         yield rows.filter(whole)
                         held = [rows.filter(pc.invert(whole))]
+
+    def scenes(self) -> list[dict[str, Any]]:
+        """Facts of the scenes that the stored parts come from, in their order."""
+        found: list[dict[str, Any]] = []
+        for file in sorted(self._parts.glob("*.parquet")):
+            found += json.loads((pq.read_schema(file).metadata or {}).get(SCENE_FACTS, b"[]"))
+        return found
 
     def groups(self) -> list[tuple[str, str]]:
         """The scenarios and variations of the merged file, in its order."""

@@ -18,6 +18,7 @@ from merge_cosim.experiments.pieces import Handout, Piece, cut
 from merge_cosim.experiments.plan import SweepRequest, identity, method_names, plan
 from merge_cosim.experiments.statistics import belief, calibration, oracle_best, strata, summarise
 from merge_cosim.experiments.statistics.comparison import reference_of
+from merge_cosim.experiments.statistics.traffic import scene_tables
 from merge_cosim.experiments.store import (
     BELIEF_CSV,
     CALIBRATION_CSV,
@@ -27,7 +28,7 @@ from merge_cosim.experiments.store import (
     SUMMARY_JSON,
     ResultFolder,
 )
-from merge_cosim.experiments.work import Batch
+from merge_cosim.experiments.work import Task
 
 __all__ = ["SweepRequest", "plan", "sweep"]
 
@@ -63,23 +64,23 @@ def sweep(
         UserError: See `plan` and `ResultFolder.begin`.
     """
     begin = perf_counter()
-    batches = plan(request)
+    tasks = plan(request)
     folder = ResultFolder(out)
-    what = identity(request, batches)
+    what = identity(request, tasks)
     if reuse and folder.holds(what):
         manifest: dict[str, Any] = folder.read_json(MANIFEST)
         return manifest
     folder.begin(what, resume)
     planned = perf_counter()
-    tally = _run(request, list(cut(batches)), folder, progress)
+    tally = _run(request, list(cut(tasks)), folder, progress)
     ran = perf_counter()
     wants_best = not request.methods or ORACLE_BEST in request.methods
     folder.merge(oracle_best if wants_best else None)
-    _sum_up(batches, folder, tally, reference_of(method_names(request, batches), request.against))
+    _sum_up(tasks, folder, tally, reference_of(method_names(request, tasks), request.against))
     effort, run_s = tally.effort, ran - planned
     manifest = {
         **what,
-        "left_out": {batch.scenario.name: list(batch.left_out) for batch in batches if batch.left_out},
+        "left_out": {task.scenario.name: list(task.left_out) for task in tasks if task.left_out},
         "command": {"jobs": request.jobs, "start": request.start, "dask": request.dask, "resumed": resume},
         "wall_s": round(perf_counter() - begin, 3),
         "plan_s": round(planned - begin, 3),
@@ -114,9 +115,9 @@ def _run(request: SweepRequest, pieces: Sequence[Piece], folder: ResultFolder, p
     return tally
 
 
-def _sum_up(batches: Sequence[Batch], folder: ResultFolder, tally: _Tally, against: str | None) -> None:
+def _sum_up(tasks: Sequence[Task], folder: ResultFolder, tally: _Tally, against: str | None) -> None:
     """Write the traces, the summary and the tables beside it, one scenario and variation at a time."""
-    single_us, traces = run_alone(batches, folder)
+    single_us, traces = run_alone(tasks, folder)
     folder.write_traces(traces)
     cycle_us = {
         name: (1e6 * effort.method_s / effort.encounter_cycles, single_us.get(name))
@@ -130,7 +131,8 @@ def _sum_up(batches: Sequence[Batch], folder: ResultFolder, tally: _Tally, again
         parts[STRATA_CSV].append(strata(rows, against))
         parts[BELIEF_CSV].append(belief(rows))
         parts[CALIBRATION_CSV].append(calibration(rows))
-    tables = {name: pd.concat(found, ignore_index=True) for name, found in parts.items()}
+    tables = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in parts.items()}
+    tables |= scene_tables(folder.scenes())
     for name, table in tables.items():
         (folder.path / name).unlink(missing_ok=True)
         if len(table):

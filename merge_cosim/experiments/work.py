@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
+import numpy as np
 import pyarrow as pa
 
 from merge_cosim.control.acc import Acc
@@ -19,33 +22,64 @@ from merge_cosim.experiments.scenario import Scenario
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.units import DT, FloatArray
 
 TILES = 160
 """Encounters side by side in one SUMO. Fewer spread the cost of a cycle's Python over fewer cars; with more than about
 190 SUMO's own step costs more per car, as its cars no longer fit the processor's cache."""
 
+PIECE_CASES = 1_000
+"""Most encounters that are handed out at a time: enough to keep the tiles busy, few enough to lose little when
+interrupted."""
+USUAL_ACCELERATION = 1.0
+"""Acceleration [m/s^2] by which the length of a case is guessed."""
 
-@dataclass(frozen=True)
-class Batch:
-    """Some encounters of one scenario under one method.
+
+@dataclass(frozen=True, kw_only=True)
+class Task(ABC):
+    """Something of one scenario that is run under one method: `len` cases, which can be parted.
 
     Attributes:
         scenario: The scenario, variation applied.
         variation: What was varied, such as `acc.headway=1.0`; empty for the scenario as it is.
         method: The method.
         model: Its learned model, if it needs one.
-        encounters: The cases.
         seed: SUMO's seed.
         left_out: Names of cases of the scenario that do not fit on its ramp.
+        most: Most cases that are handed out at a time.
     """
 
     scenario: Scenario
-    variation: str
+    variation: str = ""
     method: Method
-    model: IntentionModel | None
-    encounters: Encounters
+    model: IntentionModel | None = None
     seed: int = 0
     left_out: tuple[str, ...] = ()
+    most: int
+
+    @abstractmethod
+    def __len__(self) -> int:
+        """How many cases."""
+
+    @abstractmethod
+    def case(self, number: int) -> str:
+        """Name of a case."""
+
+    @abstractmethod
+    def part(self, first: int, last: int) -> Self:
+        """The cases `first` to `last - 1` as a task of their own."""
+
+    @abstractmethod
+    def cycles(self) -> FloatArray:
+        """Expected cycles of each case, shape (len(self),)."""
+
+    @abstractmethod
+    def digest(self) -> str:
+        """A short hash of what its cases hold."""
+
+    @abstractmethod
+    def run(self, workplace: Workplace) -> tuple[pa.Table, Effort]:
+        """Simulate the cases and return their result rows and what they cost."""
 
     @property
     def names(self) -> dict[str, str]:
@@ -58,8 +92,61 @@ class Batch:
         }
 
     def setting(self, ramp: Ramp) -> Setting:
-        """Speed limit and cycle of the batch."""
+        """Speed limit and cycle."""
         return Setting(speed_limit=self.scenario.speed_limit or ramp.speed_limit)
+
+    def free_law(self) -> Acc:
+        """The law whose free driving delays are measured against."""
+        settings = {key.partition(".")[2]: value for key, value in self.method.settings if key.startswith("acc.")}
+        law = controllers.build("acc", settings, self.method.name)
+        assert isinstance(law, Acc)
+        return law
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch(Task):
+    """Some encounters of one scenario under one method.
+
+    Attributes:
+        encounters: The cases.
+    """
+
+    encounters: Encounters
+    most: int = PIECE_CASES
+
+    def __len__(self) -> int:
+        return len(self.encounters)
+
+    def case(self, number: int) -> str:
+        """Name of a case."""
+        return str(self.encounters.case[number])
+
+    def part(self, first: int, last: int) -> Self:
+        """The cases `first` to `last - 1`, made only when asked for, so that a million cases are not held twice."""
+        return replace(self, encounters=self.encounters.part(first, last), left_out=())
+
+    def cycles(self) -> FloatArray:
+        """Rough length of each case: both cars accelerate to the merging point, then it is scored."""
+        encounters, rules = self.encounters, self.scenario.test
+        arrivals = [
+            (np.sqrt(speed**2 + 2 * USUAL_ACCELERATION * np.maximum(-station, 0.0)) - speed) / USUAL_ACCELERATION
+            for station, speed in (
+                (encounters.host_station, encounters.host_speed),
+                (encounters.merging_station, encounters.merging_speed),
+            )
+        ]
+        expected: FloatArray = np.minimum(np.maximum(*arrivals) + rules.horizon, rules.time_out) / DT
+        return expected
+
+    def digest(self) -> str:
+        """A short hash of the encounters."""
+        return self.encounters.digest
+
+    def run(self, workplace: Workplace) -> tuple[pa.Table, Effort]:
+        """Simulate the cases on tiles."""
+        ramp = Ramp.load(self.scenario.ramp)
+        run = simulate_batch(self, workplace.plant(ramp, len(self), self.seed), ramp)
+        return rows_of(self, run, ramp), run.effort
 
 
 class Workplace:
@@ -86,14 +173,6 @@ class Workplace:
             self._plant = None
 
 
-def run_batch(batch: Batch, workplace: Workplace) -> tuple[pa.Table, Effort]:
-    """Simulate a batch and return its result rows and what they cost."""
-    ramp = Ramp.load(batch.scenario.ramp)
-    plant = workplace.plant(ramp, len(batch.encounters), batch.seed)
-    run = simulate_batch(batch, plant, ramp)
-    return rows_of(batch, run, ramp), run.effort
-
-
 def simulate_batch(batch: Batch, plant: Plant, ramp: Ramp, traced: Sequence[int] = ()) -> Run:
     """Simulate a batch on a given plant; the human host needs none."""
     if batch.method.is_human:
@@ -113,7 +192,4 @@ def simulate_batch(batch: Batch, plant: Plant, ramp: Ramp, traced: Sequence[int]
 
 def rows_of(batch: Batch, run: Run, ramp: Ramp) -> pa.Table:
     """The result rows of a batch's run."""
-    settings = {key.partition(".")[2]: value for key, value in batch.method.settings if key.startswith("acc.")}
-    law = controllers.build("acc", settings, batch.method.name)
-    assert isinstance(law, Acc)
-    return result_rows(run, batch.encounters, batch.setting(ramp), law, batch.names)
+    return result_rows(run, batch.encounters, batch.setting(ramp), batch.free_law(), batch.names)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from lxml import etree
@@ -30,6 +32,69 @@ class _Car:
     merge_position: float | None
 
 
+@dataclass(frozen=True)
+class Configuration:
+    """A `.sumocfg`, as far as we need to know it.
+
+    Attributes:
+        file: The file.
+        net: Its net, beside which lies a `ramp.toml`.
+        routes: Its route files.
+        additional: Its additional files.
+        end: Its end [s]; inf if it does not say.
+    """
+
+    file: Path
+    net: Path
+    routes: tuple[Path, ...]
+    additional: tuple[Path, ...]
+    end: float
+
+    @classmethod
+    def read(cls, file: Path) -> Configuration:
+        """Read it.
+
+        Raises:
+            UserError: A file is missing or no XML, or the net is not that of a ramp.
+        """
+        root = _parse(file)
+        net = file.parent / (_option(root, "net-file") or _missing(file, "net-file"))
+        if not (net.parent / FILE_NAME).is_file():
+            raise UserError(
+                f"{file}: no {FILE_NAME} beside its net {net}; make one with: merge-cosim ramp new NAME --from-net {net}"
+            )
+        routes, additional = (
+            tuple(file.parent / name.strip() for name in _option(root, option).split(",") if name.strip())
+            for option in ("route-files", "additional-files")
+        )
+        if not routes:
+            _missing(file, "route-files")
+        return cls(file, net, routes, additional, float(_option(root, "end") or math.inf))
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All of them."""
+        return (self.file, self.net, *self.routes, *self.additional)
+
+    def vehicles(self) -> Iterator[etree._Element]:
+        """Everything in the route files that puts a vehicle or a person in."""
+        for file in self.routes:
+            yield from _parse(file).iter("vehicle", "trip", "flow", "person", "personFlow")
+
+    def names_role(self, role: str) -> bool:
+        """Whether any vehicle or type has the role."""
+        parameters = (one for file in (*self.routes, *self.additional) for one in _parse(file).iter("param"))
+        return any(one.get("key") == ROLE and one.get("value") == role for one in parameters)
+
+
+def only_pairs(configuration: Configuration) -> bool:
+    """Whether there is nothing but as many hosts as merging cars, starting from numbers: encounters, and no traffic."""
+    entries = [entry for file in configuration.routes for entry in _entries(_parse(file)) if entry.has_start]
+    roles = [entry.role for entry in entries]
+    everything = len(list(configuration.vehicles()))
+    return everything == len(entries) and roles.count("host") == roles.count("merging")
+
+
 def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
     """Read the ramp and the encounters of a `.sumocfg`.
 
@@ -40,12 +105,8 @@ def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
     Raises:
         UserError: A file is missing or no XML, or a car cannot be understood.
     """
-    root = _parse(file)
-    net = file.parent / _option(root, "net-file", file)
-    if not (net.parent / FILE_NAME).is_file():
-        raise UserError(f"{file}: no {FILE_NAME} beside its net {net}; start a ramp with: merge-cosim ramp new NAME")
-    ramp = Ramp.load(net.parent)
-    routes = [file.parent / name.strip() for name in _option(root, "route-files", file).split(",")]
+    configuration = Configuration.read(file)
+    ramp, routes = Ramp.load(configuration.net.parent), configuration.routes
     cars: dict[str, list[_Car]] = {role: [] for role in ROLES}
     for route_file in routes:
         for role, car in _cars(route_file):
@@ -89,17 +150,37 @@ def _stations(ramp: Ramp, cars: list[_Car], merge_position: np.ndarray, file: Pa
     return np.array(stations)
 
 
-def _cars(file: Path) -> Iterator[tuple[str, _Car]]:
-    root = _parse(file)
+@dataclass(frozen=True)
+class _Entry:
+    """A `<vehicle>` with a role, its type, and the parameters of both."""
+
+    vehicle: etree._Element
+    kind: etree._Element
+    role: str
+    parameters: dict[str | None, str]
+
+    @property
+    def has_start(self) -> bool:
+        """Its start is given in numbers."""
+        return all(_is_number(self.vehicle.get(name)) for name in ("departPos", "departSpeed"))
+
+
+def _entries(root: etree._Element) -> Iterator[_Entry]:
     types = {kind.get("id", ""): kind for kind in root.iter("vType")}
-    routes = {route.get("id"): route.get("edges", "") for route in root.iter("route")}
     for vehicle in root.iter("vehicle"):
         kind = types.get(vehicle.get("type", ""))
         parameters = {one.get("key"): one.get("value", "") for one in ([] if kind is None else kind.iter("param"))}
         parameters |= {one.get("key"): one.get("value", "") for one in vehicle.iter("param")}
         role = parameters.get(ROLE)
-        if kind is None or role is None:
-            continue
+        if kind is not None and role is not None:
+            yield _Entry(vehicle, kind, role, parameters)
+
+
+def _cars(file: Path) -> Iterator[tuple[str, _Car]]:
+    root = _parse(file)
+    routes = {route.get("id"): route.get("edges", "") for route in root.iter("route")}
+    for entry in _entries(root):
+        vehicle, kind, role, parameters = entry.vehicle, entry.kind, entry.role, entry.parameters
         where = f"{file}:{vehicle.sourceline}: vehicle '{vehicle.get('id')}'"
         if role not in ROLES:
             raise UserError(f"{where}: {ROLE} is '{role}'; it must be {' or '.join(ROLES)}")
@@ -122,18 +203,24 @@ def _cars(file: Path) -> Iterator[tuple[str, _Car]]:
 
 
 def _number(text: str | None, name: str, where: str) -> float:
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
+    if not _is_number(text):
         raise UserError(f"{where}: {name} is '{text or ''}'; an encounter needs a number")
-    return float(value)
+    return float(text or "")
 
 
-def _option(root: etree._Element, name: str, file: Path) -> str:
-    for element in root.iter(name):
-        return str(element.get("value", ""))
+def _is_number(text: str | None) -> bool:
+    try:
+        return math.isfinite(float(text or ""))
+    except ValueError:
+        return False
+
+
+def _option(root: etree._Element, name: str) -> str:
+    """Value of an option, under its long name."""
+    return next((str(element.get("value", "")) for element in root.iter(name)), "")
+
+
+def _missing(file: Path, name: str) -> NoReturn:
     raise UserError(f"{file}: no <{name} value=.../>")
 
 

@@ -57,7 +57,7 @@ def _leave_out_internal(net: etree._Element) -> None:
     for node in net.findall("junction"):
         node.set("intLanes", "")
     for link in net.findall("connection"):
-        link.attrib.pop("via", None)
+        link.attrib.pop("via", "")
 
 
 def _reduce(net: etree._Element, ramp: Ramp) -> None:

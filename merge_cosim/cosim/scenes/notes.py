@@ -22,11 +22,11 @@ class Notes:
     """Keeps one line per event and thing that it happened to; the same again is the same event.
 
     Attributes:
-        lines: The lines, in the order of the events.
+        lines: Each with its event, in their order.
     """
 
     def __init__(self) -> None:
-        self.lines: list[str] = []
+        self.lines: list[tuple[Event, str]] = []
         self._seen: set[tuple[Event, str]] = set()
         self._count: Counter[Event] = Counter()
 
@@ -36,7 +36,7 @@ class Notes:
             return
         self._seen.add((event, who))
         self._count[event] += 1
-        self.lines.append(line)
+        self.lines.append((event, line))
 
     def counts(self) -> dict[str, int]:
         """How many of each event, zeros included."""

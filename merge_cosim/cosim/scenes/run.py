@@ -12,6 +12,7 @@ from typing import Any
 from merge_cosim.cosim.loop import Driver, Effort
 from merge_cosim.cosim.scenes.controller import HostController
 from merge_cosim.cosim.scenes.meetings import Attention, Meeting
+from merge_cosim.cosim.scenes.notes import Event
 from merge_cosim.cosim.scenes.scoring import to_be_scored
 from merge_cosim.cosim.session import SumoOptions, libsumo_started, traci_started
 from merge_cosim.errors import UserError
@@ -65,13 +66,13 @@ class SceneRun:
     Attributes:
         meetings: All meetings.
         facts: Counts and means of its traffic.
-        notes: What its user should know, a line each.
+        notes: What its user should know, a line for each event.
         effort: What it cost.
     """
 
     meetings: list[Meeting]
     facts: dict[str, float]
-    notes: list[str]
+    notes: list[tuple[Event, str]]
     effort: Effort
 
 

@@ -19,6 +19,9 @@ CASE = ["scenario", "variation", "source", "site", "case"]
 GROUP = ["scenario", "variation", "site", "source", "method", "model"]
 SECTION = ["scenario", "variation", "site", "source"]
 ALL_SITES = "all"
+TRAFFIC = "traffic"
+"""The source of meetings in living traffic. What a host does there changes all that follows, so that two methods have
+no cases in common."""
 AMBIGUITY_EDGES = (0.0, 1.0, 3.0, np.inf)
 """Strata of |T_m - T_h| at the start [s]."""
 ALL_STARTS = "all"
@@ -29,10 +32,10 @@ D0 = 2.0
 def oracle_best(rows: pa.Table) -> pa.Table:
     """Rows of the better of always-go and always-yield on each case: the one that does not fail, ties by delay.
 
-    It bounds what constant decisions can reach, no more. Empty where one of the two was not run.
+    It bounds what constant decisions can reach, no more. Empty where one of the two was not run, and in living traffic.
     """
     frame = rows.to_pandas()
-    frame = frame[frame["method"].isin(CONSTANT)]
+    frame = frame[frame["method"].isin(CONSTANT) & (frame["source"] != TRAFFIC)]
     frame = frame.sort_values([*CASE, "failed", "delay_s", "method"], kind="stable")
     both = frame.groupby(CASE)["method"].transform("nunique") == len(CONSTANT)
     best = frame[both].drop_duplicates(CASE).assign(method=ORACLE_BEST)
@@ -88,7 +91,8 @@ def compare_all(rows: pd.DataFrame, against: str | None) -> dict[tuple[str, ...]
     found = {}
     for names, group in frame.groupby(GROUP, sort=True):
         key = tuple(map(str, names))
-        other = others.get(key[: len(SECTION)], frame.iloc[:0]).drop_duplicates("case")
+        in_common = key[: len(SECTION)] if key[SECTION.index("source")] != TRAFFIC else ()
+        other = others.get(in_common, frame.iloc[:0]).drop_duplicates("case")
         found[key] = compare(group, other, against, _is_sample(group))
     return found
 
@@ -145,6 +149,10 @@ def _summary(
         "min_ttc_s_p05": quantile(group["min_ttc_s"], 0.05),
         "max_drac_p95": quantile(group["max_drac"], 0.95),
         "pet_s_p05": quantile(group["pet_s"], 0.05),
+        "min_leader_gap_m_p05": quantile(group["min_leader_gap_m"], 0.05),
+        "min_leader_ttc_s_p05": quantile(group["min_leader_ttc_s"], 0.05),
+        "min_follower_gap_m_p05": quantile(group["min_follower_gap_m"], 0.05),
+        "merging_stopped": count(group["merging_stopped"]),
         "unnecessary_yields": count(group["unnecessary_yield"]),
         "labelled": len(labelled),
         "decision_flips": mean(group["decision_flips"]),
@@ -182,7 +190,7 @@ def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
 
     Missing where always-go was not run.
     """
-    go = frame[frame["method"] == "always-go"].drop_duplicates(CASE)
+    go = frame[(frame["method"] == "always-go") & (frame["source"] != TRAFFIC)].drop_duplicates(CASE)
     possible = go["host_first"].eq(True) & ~go["failed"] & (go["gap_m"].fillna(np.inf) >= D0)
     known = frame[CASE].merge(go[CASE].assign(possible=possible.astype("boolean")), how="left", on=CASE)["possible"]
     known = known.set_axis(frame.index)

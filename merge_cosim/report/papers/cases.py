@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from merge_cosim.encounter import Encounters
-from merge_cosim.experiments.plan import plan
+from merge_cosim.experiments.plan import plan_encounters
 from merge_cosim.experiments.reproduction import Study
 from merge_cosim.experiments.single import trace_methods
 from merge_cosim.report.methods import in_order
@@ -52,7 +52,7 @@ class NamedCase:
 def published_case(study: Study) -> NamedCase:
     """The pair nearest to the published initial state, and whether it is near enough to be the same."""
     request = replace(study.request, scenarios=("us101-replay",), methods=LOGGED_METHODS)
-    encounters = plan(request)[0].encounters
+    encounters = plan_encounters(request)[0].encounters
     away = [np.abs(getattr(encounters, name) - value) / NEAR[name] for name, value in WANTED.items()]
     distance = np.max(away, axis=0)
     nearest = int(np.argmin(distance))
@@ -63,7 +63,7 @@ def published_case(study: Study) -> NamedCase:
 def behind_but_accelerating(study: Study) -> NamedCase:
     """The situation of Fig. 3: the merging car is behind the host and accelerates."""
     request = replace(study.request, scenarios=("designed-2",), methods=BEHIND_METHODS, settings={})
-    encounters = plan(request)[0].encounters
+    encounters = plan_encounters(request)[0].encounters
     row = int(np.flatnonzero(encounters.case == BEHIND_CASE)[0])
     return NamedCase(BEHIND_CASE, _start(encounters, row), True, *trace_methods(request, BEHIND_CASE))
 

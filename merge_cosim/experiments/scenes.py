@@ -1,0 +1,137 @@
+"""Scenes as tasks of a sweep: each is one SUMO simulation of living traffic, and its cases are the meetings in it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import pyarrow as pa
+
+from merge_cosim.cosim.loop import Effort
+from merge_cosim.cosim.scenes.meetings import Ending
+from merge_cosim.cosim.scenes.run import Scene, SceneRun, run_scene
+from merge_cosim.cosim.scenes.scoring import encounters_of, score, to_be_scored
+from merge_cosim.experiments.outcome import SCHEMA, result_rows
+from merge_cosim.experiments.scenario import Routes, Traffic
+from merge_cosim.experiments.statistics.summary import TRAFFIC
+from merge_cosim.experiments.store import SCENE_FACTS
+from merge_cosim.experiments.work import Task, Workplace
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.route_reader import Configuration
+from merge_cosim.traffic.demand import write_traffic
+from merge_cosim.units import DT, FloatArray
+
+USUAL_LENGTH = 600.0
+"""Length of a scene [s] where its configuration does not say."""
+MEETINGS_AT_A_TIME = 64
+"""Meetings at a time in one copy of a ramp."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneBatch(Task):
+    """Some scenes of one scenario under one method: the same traffic under different seeds.
+
+    Attributes:
+        first, last: The scenes `first` to `last - 1`.
+    """
+
+    first: int
+    last: int
+    most: int = 1
+
+    def __len__(self) -> int:
+        return self.last - self.first
+
+    def case(self, number: int) -> str:
+        """Name of a scene, which begins the names of its meetings."""
+        return f"{self.first + number:03d}"
+
+    def part(self, first: int, last: int) -> Self:
+        """Some of the scenes."""
+        return replace(self, first=self.first + first, last=self.first + last)
+
+    def cycles(self) -> FloatArray:
+        """Cycles of each scene, once per car that is usually there, shape (len(self),)."""
+        traffic = self.scenario.encounters
+        length = traffic.demand.duration if isinstance(traffic, Traffic) else USUAL_LENGTH
+        return np.full(len(self), length / DT)
+
+    def digest(self) -> str:
+        """A short hash of the files that a scene consists of; what generated traffic depends on is in the scenario."""
+        files = Configuration.read(self.file).files if self.file else (Ramp.load(self.scenario.ramp).net,)
+        held = hashlib.sha256(f"{self.first} {self.last}".encode())
+        for file in files:
+            held.update(file.read_bytes())
+        return held.hexdigest()[:16]
+
+    @property
+    def file(self) -> Path | None:
+        """The user's `.sumocfg`, if it is one's."""
+        return self.scenario.encounters.file if isinstance(self.scenario.encounters, Routes) else None
+
+    def run(self, workplace: Workplace) -> tuple[pa.Table, Effort]:
+        """Simulate the scenes, one after the other; their facts are in the table's metadata."""
+        workplace.close()  # libsumo holds one simulation per process
+        effort, tables, facts = Effort(), [], []
+        for number in range(len(self)):
+            with self.scene(number) as scene:
+                run = self.simulate(scene)
+            effort.add(run.effort)
+            tables.append(self.rows(run, scene))
+            facts.append(self.facts(run, scene))
+        rows = pa.concat_tables(tables)
+        return rows.replace_schema_metadata({**(SCHEMA.metadata or {}), SCENE_FACTS: json.dumps(facts)}), effort
+
+    @contextmanager
+    def scene(self, number: int) -> Iterator[Scene]:
+        """A scene with its files, which are there as long as the context is."""
+        traffic, ramp = self.scenario.encounters, Ramp.load(self.scenario.ramp)
+        assert isinstance(traffic, (Traffic, Routes))
+        with tempfile.TemporaryDirectory(prefix="merge-cosim-") as folder:
+            if isinstance(traffic, Traffic):
+                file = write_traffic(Path(folder), traffic.demand, ramp)
+                end, warm_up, copies = traffic.demand.duration, traffic.demand.warm_up, traffic.demand.copies
+            else:
+                file, warm_up, copies = traffic.file, 0.0, 1
+                end = traffic.end or Configuration.read(file).end
+            yield Scene(
+                name=self.case(number),
+                file=file,
+                ramp=ramp,
+                seed=self.seed + traffic.seed + self.first + number,
+                end=end,
+                warm_up=warm_up,
+                host=traffic.host,
+                attention=traffic.attention,
+                capacity=MEETINGS_AT_A_TIME * copies,
+            )
+
+    def simulate(self, scene: Scene, **how: Any) -> SceneRun:
+        """Run a scene under the method; `how` goes to `run_scene`."""
+        driver = self.method.driver(self.model)
+        return run_scene(scene, driver, self.setting(scene.ramp), self.scenario.test.horizon, **how)
+
+    def rows(self, run: SceneRun, scene: Scene) -> pa.Table:
+        """One result row for each meeting in which the car merged next to the host."""
+        meetings = to_be_scored(run.meetings)
+        encounters = encounters_of(meetings, scene.name, scene.ramp.name, TRAFFIC)
+        scored, others = score(meetings, encounters, self.scenario.test)
+        unfinished = ~scored.columns["scored_to_end"] & (scored.columns["kind"] == 0)
+        cut_off = np.array([meeting.ending is Ending.CENSORED for meeting in meetings], dtype=bool)
+        more = {
+            **{name: pa.array(values, mask=~np.isfinite(values)) for name, values in others.items()},
+            "censored": unfinished & cut_off,
+            "merging_stopped": np.array([meeting.stopped for meeting in meetings], dtype=bool),
+        }
+        return result_rows(scored, encounters, self.setting(scene.ramp), self.free_law(), self.names, more)
+
+    def facts(self, run: SceneRun, scene: Scene) -> dict[str, Any]:
+        """What there is to say of a scene as a whole."""
+        return {**self.names, "scene": scene.name, "seed": scene.seed, **run.facts, "notes": run.notes}
