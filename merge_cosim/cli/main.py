@@ -30,6 +30,12 @@ SHOWN = (
 )
 """Columns of the summary that fit a terminal."""
 
+SHOWN_TRAFFIC = (
+    *("scenario", "variation", "method", "scenes", "throughput_veh_h", "mean_speed", "time_loss_s", "hosts"),
+    *("meetings", "meetings_scored", "merging_stopped", "host_contacts", "other_contacts", "emergency_brakings"),
+)
+"""The same of the table of scenes."""
+
 USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 """typer's UsageError; typer gives it no public name."""
 
@@ -92,6 +98,10 @@ def sweep(
     else:
         rows = [{name: row[name] for name in SHOWN} for row in folder.read_json(SUMMARY_JSON)]
         show_table(rows, f"{out}: {', '.join(scenarios)}")
+        if traffic := folder.traffic():
+            show_table([{name: row[name] for name in SHOWN_TRAFFIC} for row in traffic], "the traffic as a whole")
+    for line in folder.told():
+        typer.echo(line, err=True)
 
 
 @app.command()

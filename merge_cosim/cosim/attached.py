@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
+from pathlib import Path
+from typing import Any
 
-from merge_cosim.cosim.session import ApiSession, Car, RawCalls, SumoOptions, own_traci
+from merge_cosim.cosim.session import ApiSession, Car, Errors, RawCalls, SumoOptions, own_traci
 from merge_cosim.errors import UserError
 from merge_cosim.ramps.ramp import read_net
 from merge_cosim.units import TOLERANCE
@@ -39,6 +41,35 @@ class Address:
         return f"{self.host}:{self.port}"
 
 
+def attached_to(address: Address, conditions: Mapping[str, str]) -> tuple[Any, Errors]:
+    """Connect to a running SUMO and return traci, and the errors that it raises.
+
+    Args:
+        address: Where it listens.
+        conditions: Options that it must have been started with; and it must have no lanes inside junctions, so that a
+            path is as long as its edges.
+
+    Raises:
+        UserError: Nobody listens there, or SUMO runs under other conditions.
+    """
+    traci = own_traci()
+    errors = (traci.TraCIException, traci.FatalTraCIError)
+    try:
+        with redirect_stdout(StringIO()):  # traci prints its attempts to connect
+            traci.init(address.port, TRIES, address.host)
+    except (*errors, OSError):
+        raise UserError(
+            f"--attach {address}: no SUMO listens there; start one with --remote-port {address.port}"
+        ) from None
+    wanted = {**conditions, "no-internal-links": "true"}
+    wrong = {name: value for name, value in wanted.items() if not _same(traci.simulation.getOption(name), value)}
+    if wrong:
+        traci.close()
+        needed = " ".join(f"--{name} {value}" for name, value in wrong.items())
+        raise UserError(f"--attach {address}: SUMO must be started with {needed}")
+    return traci, errors
+
+
 class AttachedSession(ApiSession):
     """Drives our two cars in a running simulation of the ramp's own net; other cars in it are left alone.
 
@@ -47,46 +78,36 @@ class AttachedSession(ApiSession):
     """
 
     def __init__(self, options: SumoOptions, address: Address) -> None:
-        traci = own_traci()
-        self._errors = (traci.TraCIException, traci.FatalTraCIError)
+        traci, errors = attached_to(address, options.conditions)
+        self._errors: Errors = (RuntimeError, *errors)
         self._address = address
         self._net = options.net
-        try:
-            with redirect_stdout(StringIO()):  # traci prints its attempts to connect
-                traci.init(address.port, TRIES, address.host)
-        except (*self._errors, OSError):
-            raise UserError(
-                f"--attach {address}: no SUMO listens there; start one with --remote-port {address.port}"
-            ) from None
         super().__init__(traci, RawCalls(traci.vehicle.setSpeed, traci.vehicle.getLanePosition))
-        wanted = {**options.conditions, "no-internal-links": "true"}  # a path is then as long as its edges
-        wrong = {name: value for name, value in wanted.items() if not _same(traci.simulation.getOption(name), value)}
-        if wrong:
-            self.close()
-            needed = " ".join(f"--{name} {value}" for name, value in wrong.items())
-            raise UserError(f"--attach {address}: SUMO must be started with {needed}")
 
     def add(self, cars: Iterable[Car]) -> None:
         """See `Session`; another net than the ramp's, or one with cars of the same names, is the user's mistake."""
         cars = list(cars)
-        self._check_net({edge for car in cars for edge in car.route})
+        refuse_other_net(self._api, self._net, {edge for car in cars for edge in car.route}, self._address)
         try:
             super().add(cars)
-        except (*self._errors, RuntimeError) as error:
+        except self._errors as error:
             self.close()
             raise UserError(f"--attach {self._address}: the cars cannot be added: {error}") from None
 
-    def _check_net(self, edges: set[str]) -> None:
-        """Refuse a net in which a lane of these edges is not there, or not as long: stations would be wrong."""
-        running = set(self._api.lane.getIDList())
-        net = read_net(self._net)
-        for lane in (lane for edge in sorted(edges) for lane in net.getEdge(edge).getLanes()):
-            name, length = lane.getID(), lane.getLength()
-            if name not in running or abs(self._api.lane.getLength(name) - length) > TOLERANCE:
-                self.close()
-                raise UserError(
-                    f"--attach {self._address}: SUMO has another net: no lane {name} of {length:g} m; load {self._net}"
-                )
+
+def refuse_other_net(api: Any, net: Path, edges: set[str], address: Address) -> None:
+    """Close the connection where SUMO runs on a net in which these edges are not as in ours: stations would be wrong.
+
+    Raises:
+        UserError: It does.
+    """
+    running = set(api.lane.getIDList())
+    ours = read_net(net)
+    for lane in (lane for edge in sorted(edges) for lane in ours.getEdge(edge).getLanes()):
+        name, length = lane.getID(), lane.getLength()
+        if name not in running or abs(api.lane.getLength(name) - length) > TOLERANCE:
+            api.close()
+            raise UserError(f"--attach {address}: SUMO has another net: no lane {name} of {length:g} m; load {net}")
 
 
 def _same(found: str, wanted: str) -> bool:

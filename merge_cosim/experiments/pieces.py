@@ -11,6 +11,7 @@ import numpy as np
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.experiments.work import Task
 
+
 @dataclass(frozen=True)
 class Piece:
     """A stretch of a batch's cases: what is handed to a process, and stored, as a whole.

@@ -31,7 +31,6 @@ from merge_cosim.registry import did_you_mean, parameters
 from merge_cosim.traffic.base import MergingCar, merging_cars
 from merge_cosim.traffic.demand import Demand
 
-
 BY_SUMO = "sumo"
 """The merging-car model that stands for SUMO's own models: the scenario is run as scenes."""
 

@@ -134,4 +134,5 @@ class SceneBatch(Task):
 
     def facts(self, run: SceneRun, scene: Scene) -> dict[str, Any]:
         """What there is to say of a scene as a whole."""
-        return {**self.names, "scene": scene.name, "seed": scene.seed, **run.facts, "notes": run.notes}
+        notes = [(str(event), line) for event, line in run.notes]
+        return {**self.names, "scene": scene.name, "seed": scene.seed, **run.facts, "notes": notes}

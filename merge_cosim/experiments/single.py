@@ -16,7 +16,9 @@ from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.plant import SumoPlant
 from merge_cosim.cosim.session import Session, SumoOptions, TraciSession, connection_kept
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.plan import SweepRequest, plan_encounters
+from merge_cosim.experiments.plan import SweepRequest, plan, plan_encounters
+from merge_cosim.experiments.scenes import SceneBatch
+from merge_cosim.experiments.single_scene import export_scene, run_scene_alone
 from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.routes import write_encounter
@@ -55,8 +57,15 @@ def run_single(
     """
     if trace is not None and trace.suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: --trace writes .csv or .parquet")
-    batch = _case_alone(plan_encounters(request), case)
-    row, record = trace_case(batch, gui_delay, outputs, attach)
+    task = plan(request)[0]
+    if attach is not None and (gui_delay is not None or outputs.wanted):
+        raise UserError("--attach: not with --gui or SUMO's outputs; whoever starts SUMO chooses them")
+    if gui_delay is not None:
+        _need_display()
+    if isinstance(task, SceneBatch):
+        row, record = run_scene_alone(task, case, gui_delay, outputs, attach)
+    else:
+        row, record = trace_case(_case_alone(plan_encounters(request), case), gui_delay, outputs, attach)
     if trace is not None:
         trace.parent.mkdir(parents=True, exist_ok=True)
         if trace.suffix == ".csv":
@@ -77,8 +86,6 @@ def trace_case(
         raise UserError(
             f"{wanted[0]}: the method 'human' is the log itself and is not driven in SUMO; leave one of them out"
         )
-    if attach is not None and len(wanted) > 1:
-        raise UserError(f"{wanted[0]}: not with --attach; whoever starts SUMO chooses the window and the outputs")
     extra = outputs.prepare()
     if attach is not None:
         plant = SumoPlant(ramp, 1, batch.seed, lambda options: AttachedSession(options, attach), tiled=False)
@@ -116,13 +123,19 @@ def trace_methods(request: SweepRequest, case: str) -> tuple[pd.DataFrame, dict[
 
 def export_case(request: SweepRequest, case: str, out: Path) -> Path:
     """Write one case of one scenario as SUMO files into a folder; returns the `.sumocfg`."""
+    task = plan(request)[0]
+    if isinstance(task, SceneBatch):
+        return export_scene(task, out)
     batch = _case_alone(plan_encounters(request), case)
     return write_encounter(out, Ramp.load(batch.scenario.ramp), batch.encounters, 0)
 
 
-def _open_window(options: SumoOptions) -> Session:
+def _need_display() -> None:
     if "DISPLAY" not in os.environ and sys.platform.startswith("linux"):
         raise UserError("--gui: there is no display (DISPLAY is not set); leave it out, or use xvfb-run")
+
+
+def _open_window(options: SumoOptions) -> Session:
     return TraciSession(options, gui=True)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 from collections.abc import Callable, Iterator
@@ -135,6 +136,21 @@ class ResultFolder:
             found += json.loads((pq.read_schema(file).metadata or {}).get(SCENE_FACTS, b"[]"))
         return found
 
+    def traffic(self) -> list[dict[str, Any]]:
+        """Rows of the finished sweep's table of scenes; none where there were no scenes."""
+        return _csv_rows(self.path / TRAFFIC_CSV)
+
+    def told(self) -> list[str]:
+        """What was noted in the scenes, a line for each kind of event."""
+        events: dict[str, list[dict[str, Any]]] = {}
+        for row in _csv_rows(self.path / NOTES_CSV):
+            events.setdefault(row["event"], []).append(row)
+        return [
+            f"{event}: {len(rows)}, such as: {rows[0]['what']} ({rows[0]['scenario']}, {rows[0]['method']}, scene "
+            f"{rows[0]['scene']}); all in {self.path / NOTES_CSV}"
+            for event, rows in events.items()
+        ]
+
     def groups(self) -> list[tuple[str, str]]:
         """The scenarios and variations of the merged file, in its order."""
         seen: dict[tuple[str, str], None] = {}
@@ -197,6 +213,13 @@ class ResultFolder:
         if not file.is_file():
             raise UserError(f"{file}: missing; run the sweep again")
         return json.loads(file.read_text(encoding="utf-8"))
+
+
+def _csv_rows(file: Path) -> list[dict[str, Any]]:
+    if not file.is_file():
+        return []
+    with file.open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
 
 
 def _write_table(file: Path, rows: pa.Table) -> None:

@@ -61,7 +61,8 @@ class Configuration:
         net = file.parent / (_option(root, "net-file") or _missing(file, "net-file"))
         if not (net.parent / FILE_NAME).is_file():
             raise UserError(
-                f"{file}: no {FILE_NAME} beside its net {net}; make one with: merge-cosim ramp new NAME --from-net {net}"
+                f"{file}: no {FILE_NAME} beside its net {net}; make a ramp with: "
+                f"merge-cosim ramp new NAME --from-net {net.name}"
             )
         routes, additional = (
             tuple(file.parent / name.strip() for name in _option(root, option).split(",") if name.strip())

@@ -29,7 +29,7 @@ class Demand:
     """Who drives in a scene, and by which of SUMO's models.
 
     Cars come at random intervals (exponential), those of the on-ramp at even ones, as behind a ramp meter. A wave is a
-    speed sign over the main road past the ramp: it slows everybody there at regular times, and stop-and-go runs upstream.
+    speed sign over the main road past the ramp: it slows everybody there now and then, and stop-and-go runs upstream.
 
     Attributes:
         duration: Length of a scene [s].
@@ -93,32 +93,8 @@ def write_traffic(folder: Path, demand: Demand, ramp: Ramp) -> Path:
 def _routes(demand: Demand, ramp: Ramp, prefixes: list[str]) -> etree._Element:
     host = {"id": "host", "length": repr(HOST_LENGTH), "color": COLORS["host"], "sigma": "0", "speedDev": "0"}
     root = element("routes", {}, element("vType", host, element("param", {"key": ROLE, "value": "host"})))
-    for role, color in (("through", None), ("merging", COLORS["merging"])):
-        kinds = element("vTypeDistribution", {"id": role})
-        for number, driver in enumerate(DRIVERS):
-            look = {"color": color} if color else {}
-            kind = element(
-                "vType",
-                {
-                    "id": f"{role}-{number}",
-                    "probability": repr(driver.share),
-                    "length": repr(driver.length),
-                    "tau": repr(driver.tau),
-                    "accel": repr(driver.accel),
-                    "decel": repr(driver.decel),
-                    "carFollowModel": demand.car_following,
-                    "laneChangeModel": demand.lane_changing,
-                    "speedDev": repr(demand.speed_deviation),
-                    "lcCooperative": repr(demand.cooperative),
-                    "lcAssertive": repr(demand.assertive),
-                    **({"sigma": repr(demand.imperfection)} if demand.car_following != "IDM" else {}),
-                    **look,
-                },
-            )
-            if role == "merging":
-                kind.append(element("param", {"key": ROLE, "value": role}))
-            kinds.append(kind)
-        root.append(kinds)
+    root.append(_drivers(demand, "through"))
+    root.append(_drivers(demand, "merging", ROLE))
     exits = _exit_route(ramp)
     flows = {
         "through": ("through", demand.through, ramp.main_route, "random", False),
@@ -142,6 +118,30 @@ def _routes(demand: Demand, ramp: Ramp, prefixes: list[str]) -> etree._Element:
             }
             root.append(element("flow", flow, element("route", {"edges": " ".join(prefix + edge for edge in route)})))
     return root
+
+
+def _drivers(demand: Demand, name: str, parameter: str = "") -> etree._Element:
+    """The kinds of drivers of a flow; each type carries `parameter` with the name as its value."""
+    kinds = element("vTypeDistribution", {"id": name})
+    for number, driver in enumerate(DRIVERS):
+        how = {
+            "id": f"{name}-{number}",
+            "probability": repr(driver.share),
+            "length": repr(driver.length),
+            "tau": repr(driver.tau),
+            "accel": repr(driver.accel),
+            "decel": repr(driver.decel),
+            "carFollowModel": demand.car_following,
+            "laneChangeModel": demand.lane_changing,
+            "speedDev": repr(demand.speed_deviation),
+            "lcCooperative": repr(demand.cooperative),
+            "lcAssertive": repr(demand.assertive),
+            **({"sigma": repr(demand.imperfection)} if demand.car_following != "IDM" else {}),
+            **({"color": COLORS[name]} if name in COLORS else {}),
+        }
+        parameters = [element("param", {"key": parameter, "value": name})] if parameter else []
+        kinds.append(element("vType", how, *parameters))
+    return kinds
 
 
 def _exit_route(ramp: Ramp) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from merge_cosim.control.acc import Acc
 from merge_cosim.control.law import FollowingLaw
 from merge_cosim.cosim.loop import Driver
 from merge_cosim.cosim.scenes.lanes import Part, RampLanes
-from merge_cosim.cosim.scenes.meetings import Attention, Ending, Meeting
+from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Ending, Meeting
 from merge_cosim.cosim.scenes.notes import Event, Notes
 from merge_cosim.cosim.scenes.roster import Actor, Roster
 from merge_cosim.observation import Observation, Setting
@@ -51,7 +51,7 @@ class HostController:
         ramp: Ramp,
         driver: Driver,
         setting: Setting,
-        attention: Attention = Attention(),
+        attention: Attention = DEFAULT_ATTENTION,
         horizon: float = 4.0,
         seed: int = 0,
         host: str = "",
@@ -236,10 +236,8 @@ class HostController:
                 continue
             if first <= host.x <= last + attention.apart:
                 for merging in waiting:
-                    near = abs(host.x - merging.x) <= attention.apart
-                    if near and host.lane is not None and merging.lane is not None:
-                        if host.lane.copy == merging.lane.copy:
-                            yield host, merging
+                    if merging.copy == host.copy and abs(host.x - merging.x) <= attention.apart:
+                        yield host, merging
 
     def _note_events(self) -> None:
         simulation = self._api.simulation

@@ -22,6 +22,9 @@ class Attention:
     apart: float = 80.0
 
 
+DEFAULT_ATTENTION = Attention()
+
+
 class Ending(Enum):
     """How a meeting ended."""
 

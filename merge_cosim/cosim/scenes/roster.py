@@ -31,6 +31,11 @@ class Actor:
     x: float = 0.0
     speed: float = 0.0
 
+    @property
+    def copy(self) -> str:
+        """The copy of the ramp that it drives on; empty off the ramp, too."""
+        return self.lane.copy if self.lane is not None else ""
+
     def is_on(self, part: Part) -> bool:
         """Whether it drives on this part of the ramp."""
         return self.lane is not None and self.lane.part is part

@@ -9,9 +9,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from merge_cosim.cosim.attached import Address, attached_to, refuse_other_net
 from merge_cosim.cosim.loop import Driver, Effort
 from merge_cosim.cosim.scenes.controller import HostController
-from merge_cosim.cosim.scenes.meetings import Attention, Meeting
+from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Meeting
 from merge_cosim.cosim.scenes.notes import Event
 from merge_cosim.cosim.scenes.scoring import to_be_scored
 from merge_cosim.cosim.session import SumoOptions, libsumo_started, traci_started
@@ -55,7 +56,7 @@ class Scene:
     end: float
     warm_up: float = 0.0
     host: str = ""
-    attention: Attention = Attention()
+    attention: Attention = DEFAULT_ATTENTION
     capacity: int = 64
 
 
@@ -83,6 +84,7 @@ def run_scene(
     horizon: float,
     gui_delay: int | None = None,
     extra: tuple[str, ...] = (),
+    attach: Address | None = None,
 ) -> SceneRun:
     """Run a scene, its hosts driven by a method.
 
@@ -93,11 +95,12 @@ def run_scene(
         horizon: How long a meeting goes on once both cars are past the place of the lane change [s].
         gui_delay: Milliseconds per step in sumo-gui; None runs without a window.
         extra: Further options of SUMO.
+        attach: Drive the hosts of the SUMO that listens there, whatever its configuration, instead of one of our own.
 
     Raises:
-        UserError: SUMO refuses the configuration, at its start or on the way.
+        UserError: SUMO refuses the configuration, at its start or on the way; or see `attached_to`.
     """
-    with _running_sumo(scene, gui_delay, extra) as api:
+    with _running_sumo(scene, gui_delay, extra, attach) as api:
         begin = perf_counter()
         controller = HostController(
             api,
@@ -115,17 +118,14 @@ def run_scene(
         while time < scene.end and simulation.getMinExpectedNumber() > 0:
             before = perf_counter()
             api.simulationStep()
-            stepped = perf_counter()
+            effort.step_s += perf_counter() - before
             controller.cycle()
-            effort.step_s += stepped - before
-            effort.method_s += perf_counter() - stepped
             effort.vehicle_steps += count()
             time = simulation.getTime()
             if time > scene.warm_up:
                 arrived += simulation.getArrivedNumber()
         controller.close()
         effort.wall_s = perf_counter() - begin
-        effort.encounter_cycles = sum(len(meeting.states) for meeting in controller.finished)
         facts: dict[str, float] = {
             "simulated_s": time,
             "throughput_veh_h": round(HOUR * arrived / max(time - scene.warm_up, setting.dt), 1),
@@ -140,7 +140,7 @@ def run_scene(
 
 
 @contextmanager
-def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...]) -> Iterator[Any]:
+def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], attach: Address | None) -> Iterator[Any]:
     """SUMO with the scene's configuration, under the conditions that the controller rests on."""
     conditions = SumoOptions(scene.ramp.net).conditions
     del conditions["time-to-teleport"]  # the user's, whose teleports are counted
@@ -156,7 +156,10 @@ def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...]) -
         "xml-validation": "never",
     }
     words = [str(word) for name, value in options.items() for word in (f"--{name}", value)] + list(extra)
-    if gui_delay is None:
+    if attach is not None:
+        api, errors = attached_to(attach, conditions)
+        refuse_other_net(api, scene.ramp.net, {*scene.ramp.main_route, *scene.ramp.ramp_route}, attach)
+    elif gui_delay is None:
         api, errors = libsumo_started(words, scene.file)
     else:
         words += ["--delay", str(gui_delay)]

@@ -83,7 +83,8 @@ def score(meetings: Sequence[Meeting], encounters: Encounters, rules: Rules) -> 
         columns["scored_to_end"][ends] = scorer.scored_to_end(age + 1)[ends]
         running[ends] = False
     at_end = states[columns["end_cycle"], :, np.arange(n)].T.reshape(len(RECORDED), n)
-    for name, value in zip(("end_station", "end_speed", "end_merging_station", "end_merging_speed"), at_end):
+    ends_with = ("end_station", "end_speed", "end_merging_station", "end_merging_speed")
+    for name, value in zip(ends_with, at_end[:4], strict=True):
         columns[name] = value - encounters.merge_position if name.endswith("station") else value
     others = _others(states, columns["end_cycle"])
     hit = (columns["kind"] == 0) & (others["min_leader_gap_m"] < -TOLERANCE)

@@ -28,9 +28,7 @@ def scene_tables(scenes: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
     facts = pd.DataFrame([{k: v for k, v in scene.items() if k != "notes"} for scene in scenes])
     if not len(facts):
         return dict.fromkeys((SCENES_CSV, TRAFFIC_CSV, NOTES_CSV), facts)
-    how = {
-        name: "mean" if name in MEANS else "sum" for name in facts.columns if name not in (*GROUP, "scene", "seed")
-    }
+    how = {name: "mean" if name in MEANS else "sum" for name in facts.columns if name not in (*GROUP, "scene", "seed")}
     traffic = facts.groupby(GROUP, sort=True).agg({"scene": "count", **how}).rename(columns={"scene": "scenes"})
     facts = facts.sort_values([*GROUP, "scene"], ignore_index=True)
     found = pd.DataFrame(notes).sort_values([*GROUP[:3], "scene"], kind="stable") if notes else pd.DataFrame()
