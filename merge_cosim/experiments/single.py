@@ -58,8 +58,9 @@ def run_single(
     if trace is not None and trace.suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: --trace writes .csv or .parquet")
     task = plan(request)[0]
-    if attach is not None and (gui_delay is not None or outputs.wanted):
-        raise UserError("--attach: not with --gui or SUMO's outputs; whoever starts SUMO chooses them")
+    for name, given in (("--gui", gui_delay is not None), ("SUMO's outputs", outputs.wanted)):
+        if attach is not None and given:
+            raise UserError(f"{name}: not with --attach; whoever starts SUMO chooses the window and the outputs")
     if gui_delay is not None:
         _need_display()
     if isinstance(task, SceneBatch):

@@ -45,11 +45,11 @@ def test_outcomes_are_compared_case_by_case(monkeypatch):
 
 def test_the_sample_holds_failures(tmp_path):
     batch = loops._batch(400)
-    from merge_cosim.experiments.work import Workplace, run_batch
+    from merge_cosim.experiments.work import Workplace
 
     workplace = Workplace()
     try:
-        rows, _ = run_batch(batch, workplace)
+        rows, _ = batch.run(workplace)
     finally:
         workplace.close()
     assert 0 < sum(rows["failed"].to_pylist()) < len(rows)

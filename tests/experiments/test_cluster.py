@@ -128,7 +128,7 @@ def test_other_versions_are_refused():
     from merge_cosim.experiments.pieces import cut
     from merge_cosim.experiments.plan import SweepRequest, plan, versions
 
-    batch = next(cut(plan(SweepRequest(["designed-random"], ["acc"])))).batch()
+    batch = next(cut(plan(SweepRequest(["designed-random"], ["acc"])))).task()
     kit = Kit(versions() | {"libsumo": "0.1"}, {}, "designed", {})
     with pytest.raises(UserError, match=r"libsumo .* instead of 0\.1"):
         run_shipped(batch, kit)

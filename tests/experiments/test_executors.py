@@ -130,7 +130,7 @@ def test_pieces_cover_all_cases_once():
         own = [piece for piece in found if piece.whole is batch]
         assert [piece.first for piece in own] == [0, 40, 80]
         assert own[-1].last == len(batch.encounters)
-        assert own[1].batch().encounters.case.tolist() == batch.encounters.case[40:80].tolist()
+        assert own[1].task().encounters.case.tolist() == batch.encounters.case[40:80].tolist()
 
 
 def test_the_longest_piece_goes_first_once_methods_are_known():
