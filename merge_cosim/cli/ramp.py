@@ -44,7 +44,7 @@ def check_(which: Which, as_json: Json = False) -> None:
     """Say what is wrong with a ramp; exit status 1 if anything is."""
     import json
 
-    from merge_cosim.ramps.build import check
+    from merge_cosim.ramps.check import check
     from merge_cosim.ramps.ramp import find_ramp
 
     folder = find_ramp(which)
@@ -62,7 +62,8 @@ def build_(which: Which, as_json: Json = False) -> None:
     """Build a ramp's net from its plain XML sources with netconvert."""
     import json
 
-    from merge_cosim.ramps.build import build, check
+    from merge_cosim.ramps.build import build
+    from merge_cosim.ramps.check import check
     from merge_cosim.ramps.ramp import find_ramp
 
     folder = find_ramp(which)
@@ -103,7 +104,7 @@ def new(
     """Start a ramp of your own from a few numbers."""
     import json
 
-    from merge_cosim.ramps.build import check
+    from merge_cosim.ramps.check import check
     from merge_cosim.ramps.new import RampNumbers, new_ramp
 
     numbers = RampNumbers(lanes, ramp_lanes, acceleration_lane, upstream, downstream, speed_limit, lane_width)

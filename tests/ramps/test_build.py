@@ -5,7 +5,8 @@ from test_ramp import NAMES, copy_with
 
 from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
-from merge_cosim.ramps.build import build, check
+from merge_cosim.ramps.build import build
+from merge_cosim.ramps.check import check
 
 
 @pytest.mark.parametrize("name", NAMES)
