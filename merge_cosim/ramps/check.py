@@ -70,8 +70,8 @@ def notes(folder: Path) -> list[str]:
     needed = ramp.speed_limit**2 / (2.0 * COMFORTABLE_BRAKING)
     if ramp.speed_limit**2 / (2.0 * HARD_BRAKING) <= left < needed:
         found.append(
-            f"merging_point: {left:.0f} m of auxiliary lane after it; braking comfortably ({COMFORTABLE_BRAKING} m/s^2) "
-            f"from {ramp.speed_limit:g} m/s takes {needed:.0f} m"
+            f"merging_point: {left:.0f} m of auxiliary lane after it; braking comfortably "
+            f"({COMFORTABLE_BRAKING} m/s^2) from {ramp.speed_limit:g} m/s takes {needed:.0f} m"
         )
     return [f"{folder / FILE_NAME}: note: {line}" for line in found]
 
@@ -90,8 +90,8 @@ def _order(net: sumolib.net.Net, file: RampFile) -> list[str]:
                 )
             elif abs(turn(edge, following)) > MAX_TURN:
                 problems.append(
-                    f"{key}: stations would run backwards: '{onward}' turns back where '{name}' ends "
-                    f"({abs(turn(edge, following)):.0f} degrees); mend the shapes, or swap 'from' and 'to' in the .edg.xml"
+                    f"{key}: stations would run backwards: '{onward}' turns back at the end of "
+                    f"'{name}' ({abs(turn(edge, following)):.0f} degrees); mend the shapes, or swap 'from' and 'to'"
                 )
     return problems
 
@@ -128,12 +128,15 @@ def _speeds(net: sumolib.net.Net, file: RampFile) -> list[str]:
                 f"speed_limit: lane {lane.getID()} allows {lane.getSpeed():g} m/s, less than {file.speed_limit:g} m/s; "
                 "lower speed_limit, or raise the edge's speed in the .edg.xml"
             )
-    unset = [lane for lane in _on_paths(net, file) if round(lane.getSpeed(), 2) in STAND_INS]
-    for lane in unset:
-        problems.append(
-            f"speed_limit: no speed limit for lane {lane.getID()}: {lane.getSpeed():.2f} m/s is "
-            f"{STAND_INS[round(lane.getSpeed(), 2)]}; give the edge its own speed in the .edg.xml"
-        )
+    unset: dict[float, list[str]] = {}
+    for lane in _on_paths(net, file):
+        if (speed := round(lane.getSpeed(), 2)) in STAND_INS:
+            unset.setdefault(speed, []).append(lane.getID())
+    problems += [
+        f"speed_limit: no speed limit for {', '.join(lanes)}: {speed:.2f} m/s is {STAND_INS[speed]}; give the edges "
+        "their own speed in the .edg.xml"
+        for speed, lanes in unset.items()
+    ]
     return problems
 
 
@@ -220,8 +223,8 @@ def _lengths(net: sumolib.net.Net, file: RampFile) -> list[str]:
         edge = net.getEdge(edge_id)
         if abs(edge.getLength() - intended) > LENGTH_TOLERANCE:
             problems.append(
-                f"lengths.{edge_id}: built {edge.getLength():.2f} m long, intended {intended:.2f} m; change it here, or "
-                "'length' in the .edg.xml"
+                f"lengths.{edge_id}: built {edge.getLength():.2f} m long, intended {intended:.2f} m; change "
+                "it here, or 'length' in the .edg.xml"
             )
         lanes = edge.getLanes()
         # The middle of a bend is as long as its outermost lanes on average.
@@ -269,7 +272,7 @@ def _sources(folder: Path, file: RampFile) -> list[str]:
         return [str(error)]
     if fresh == (folder / file.net).read_bytes():
         return []
-    return [f"{folder / file.net}: older than its plain XML; build it with: merge-cosim ramp build {folder}"]
+    return [f"{folder / file.net}: not what its plain XML builds now; build it with: merge-cosim ramp build {folder}"]
 
 
 def _on_paths(net: sumolib.net.Net, file: RampFile) -> list[Any]:

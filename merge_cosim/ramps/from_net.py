@@ -1,24 +1,23 @@
-"""Start a ramp of one's own from a SUMO net: the stretch around one on-ramp, as plain XML that can be edited and rebuilt."""
+"""Start a ramp of one's own from a SUMO net: the stretch around one on-ramp, to be edited and rebuilt."""
 
 from __future__ import annotations
 
-import re
+import gzip
+import zlib
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import sumolib
-from sumolib.net.lane import SUMO_VEHICLE_CLASSES
+from lxml import etree
 
 from merge_cosim.errors import UserError
 from merge_cosim.ramps.definition import Extensions, RampFile
-from merge_cosim.ramps.folder import document, require_new, write_ramp
-from merge_cosim.ramps.infer import Course, Joint, Lane, course, joint_of, joints
-from merge_cosim.ramps.layout import Layout, Road, lay_out, nodes
+from merge_cosim.ramps.folder import require_new, write_ramp
+from merge_cosim.ramps.infer import Course, Joint, course, joint_of, joints
+from merge_cosim.ramps.layout import Layout, lay_out
 from merge_cosim.ramps.new import RampNumbers, default_merging_point
-from merge_cosim.ramps.view import ROLES
-from merge_cosim.units import FloatArray
+from merge_cosim.ramps.plain import PlainXml
 
 MIN_AFTER = 100.0
 """Road kept beyond the acceleration lane's end, at least [m]."""
@@ -64,7 +63,7 @@ def ramp_from_net(
     """
     require_new(folder)
     origin = origin or Origin(net_file)
-    net = read_foreign_net(net_file, origin.file)
+    net = _read(net_file, origin.file)
     try:
         joint, path = _choose(net, link, upstream, downstream)
     except UserError as error:
@@ -74,27 +73,39 @@ def ramp_from_net(
         raise UserError(f"{origin.file}: the acceleration lane is too long for the road; give --downstream {after:.0f}")
     layout = lay_out(path, upstream, downstream)
     limit = speed_limit or float(layout.main[layout.gore].lane.getSpeed())
-    writer = _Writer(net, path, layout, speed_limit)
+    plain = PlainXml(net, path, layout, speed_limit)
     definition = _definition(folder.name, joint, path, layout, limit, origin, given=speed_limit is not None)
-    return write_ramp(folder, writer.nodes(), writer.edges(), writer.connections(), definition)
+    return write_ramp(folder, plain.nodes(), plain.edges(), plain.connections(), definition)
 
 
-def read_foreign_net(path: Path, named: Path) -> sumolib.net.Net:
-    """Read a net that is no ramp's yet; `named` is the file that error lines speak of.
+def root_element(file: Path) -> etree._Element:
+    """First element of an XML file, which may be compressed with gzip.
 
     Raises:
-        UserError: There is no such file, or it is no SUMO net with right-hand traffic.
+        UserError: The file is missing or no XML.
     """
-    if not path.is_file():
-        raise UserError(f"{named}: no such file")
+    if not file.is_file():
+        raise UserError(f"{file}: no such file")
     try:
-        net = sumolib.net.readNet(str(path), lxml=False)
-        edges = net.getEdges()
+        with gzip.open(file) if file.suffix == ".gz" else file.open("rb") as content:
+            _, root = next(etree.iterparse(content, events=("start",)))
+    except (etree.XMLSyntaxError, OSError, EOFError, zlib.error, StopIteration):
+        raise UserError(f"{file}: not XML; a .pbf becomes OSM XML with: osmium cat FILE.osm.pbf -o FILE.osm") from None
+    return root
+
+
+def _read(path: Path, named: Path) -> sumolib.net.Net:
+    """Read a net; `named` is the file that error lines speak of."""
+    root = root_element(path)
+    if root.tag != "net":
+        more = "an extract of OpenStreetMap goes with --from-osm" if root.tag == "osm" else "give a .net.xml"
+        raise UserError(f"{named}: its root is <{root.tag}>, not <net>; {more}")
+    if root.get("lefthand", "false").lower() in ("true", "1", "yes"):
+        raise UserError(f"{named}: a net with left-hand traffic; mirror it first (netconvert --flip-y-axis)")
+    try:
+        return sumolib.net.readNet(str(path))
     except Exception as error:  # sumolib passes on whatever its parser meets
-        raise UserError(f"{named}: not a SUMO net (.net.xml, or .net.xml.gz): {error}") from None
-    if not edges:
-        raise UserError(f"{named}: no edge in it; is it a SUMO net (.net.xml)?")
-    return net
+        raise UserError(f"{named}: not a SUMO net: {error}") from None
 
 
 def _choose(net: sumolib.net.Net, link: str | None, upstream: float, downstream: float) -> tuple[Joint, Course]:
@@ -135,114 +146,6 @@ def _listed(net: sumolib.net.Net, upstream: float, downstream: float) -> str:
             "lanes or a lower limit) joins a main road at an acute angle; name the on-ramp's last edge with --link"
         )
     return f"{len(shown)} on-ramps; choose one with --link: {', '.join(shown)}"
-
-
-class _Writer:
-    """Plain XML of a layout."""
-
-    def __init__(self, net: sumolib.net.Net, path: Course, layout: Layout, speed_limit: float | None) -> None:
-        self._net, self._layout, self._speed_limit = net, layout, speed_limit
-        self._nodes = nodes(layout.roads)
-        self._joins = not path.beside
-        self._merging = {lane.getID() for lane in (*path.ramp, *path.beside)}
-
-    def nodes(self) -> str:
-        """Content of the `.nod.xml`."""
-        gore = self._layout.main[self._layout.gore].start
-        rows = self._location()
-        for name, node in self._nodes.items():
-            kind = "unregulated"
-            if not len(node.corners):
-                kind = "dead_end"
-            elif name == gore and self._joins:
-                kind = "zipper"  # SUMO's own drivers let each other in by turns
-            shape = f' radius="1" shape="{_points(node.corners)}"' if len(node.corners) else ""
-            x, y = (f"{value + 0.0:.2f}" for value in node.place)
-            rows.append(f'<node id={quoteattr(name)} x="{x}" y="{y}" type="{kind}"{shape}/>')
-        comment = "Metres; (0, 0) is the axis of the host's lane at the gore. Joining nodes carry a shape 2 m long."
-        return document("nodes", comment, rows)
-
-    def edges(self) -> str:
-        """Content of the `.edg.xml`."""
-        rows: list[str] = []
-        for road in self._layout.main:
-            rows += self._edge(road, main=True)
-        for road in self._layout.ramp:
-            rows += self._edge(road, role="ramp")
-        for road in self._layout.exit:
-            rows += self._edge(road, role="exit")
-        comment = "Each shape is the middle of its edge (spreadType center); length is what SUMO drives, node to node."
-        return document("edges", comment, rows)
-
-    def connections(self) -> str:
-        """Content of the `.con.xml`."""
-        kept = {road.edge.getID(): road.edge for road in self._layout.roads}
-        links = [
-            (edge.getID(), link.getFromLane().getIndex(), onward.getID(), link.getToLane().getIndex())
-            for edge in kept.values()
-            for onward, between in edge.getOutgoing().items()
-            if onward.getID() in kept and self._meet(edge.getID(), onward.getID())
-            for link in between
-        ]
-        rows = [
-            f'<connection from={quoteattr(start)} fromLane="{lane}" to={quoteattr(end)} toLane="{onto}"/>'
-            for start, lane, end, onto in sorted(set(links))
-        ]
-        return document("connections", "Every connection there is: lane 0 is the right-most lane.", rows)
-
-    def _meet(self, edge: str, onward: str) -> bool:
-        ends = {road.edge.getID(): road.end for road in self._layout.roads}
-        starts = {road.edge.getID(): road.start for road in self._layout.roads}
-        return ends[edge] == starts[onward]
-
-    def _edge(self, road: Road, role: str = "main", main: bool = False) -> list[str]:
-        lanes = road.edge.getLanes()
-        name = f" name={quoteattr(road.edge.getName())}" if road.edge.getName() else ""
-        closed = {_closed(lane) for lane in lanes}
-        alike = closed.pop() if len(closed) == 1 else ""
-        rows = [
-            f"<edge id={quoteattr(road.edge.getID())} from={quoteattr(road.start)} to={quoteattr(road.end)}{name} "
-            f'numLanes="{len(lanes)}" speed="{self._speed(lanes[-1], main):.2f}" spreadType="center"{alike} '
-            f'length="{road.length:.2f}" shape="{_points(road.axis)}">'
-        ]
-        for lane in lanes:
-            own = role
-            if main:
-                own = "host" if lane is road.lane else "auxiliary" if lane.getID() in self._merging else "main"
-            rows.append(
-                f'    <lane index="{lane.getIndex()}" speed="{self._speed(lane, main):.2f}" '
-                f'width="{lane.getWidth():.2f}"{"" if alike else _closed(lane)}><param key="role" value="{ROLES[own]}"/></lane>'
-            )
-        return [*rows, "</edge>"]
-
-    def _speed(self, lane: Lane, main: bool) -> float:
-        return self._speed_limit if main and self._speed_limit else float(lane.getSpeed())
-
-    def _location(self) -> list[str]:
-        """Where the ramp lies on the globe, if the net knows it."""
-        known = self._net._location
-        if known.get("projParameter", "!") == "!":
-            return []
-        east, north = self._layout.origin
-        offset_x, offset_y = map(float, known["netOffset"].split(","))
-        points = [point for road in self._layout.roads for point in road.axis]
-        west, south = (min(point[axis] for point in points) for axis in (0, 1))
-        far_east, far_north = (max(point[axis] for point in points) for axis in (0, 1))
-        boundary = f"{west:.2f},{south:.2f},{far_east:.2f},{far_north:.2f}"
-        return [
-            f'<location netOffset="{offset_x - east:.2f},{offset_y - north:.2f}" convBoundary="{boundary}" '
-            f'origBoundary={quoteattr(known["origBoundary"])} projParameter={quoteattr(known["projParameter"])}/>'
-        ]
-
-
-def _closed(lane: Lane) -> str:
-    """Attribute for the vehicle classes that a lane is closed to."""
-    closed = sorted(SUMO_VEHICLE_CLASSES - set(lane.getPermissions()))
-    return f' disallow="{" ".join(closed)}"' if closed else ""
-
-
-def _points(line: FloatArray) -> str:
-    return " ".join(f"{x + 0.0:.2f},{y + 0.0:.2f}" for x, y in line)
 
 
 def _definition(
@@ -287,5 +190,5 @@ def _definition(
 
 def _title(joint: Joint, name: str) -> str:
     """The road's name, where it has one."""
-    road = joint.gore.getName() or joint.through.getName()
+    road = joint.gore.getName() or joint.through.getName() or joint.gore.getParam("ref")
     return f"{name}: {joint.link.getName() or 'on-ramp'} onto {road}" if road else name

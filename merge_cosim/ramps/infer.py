@@ -75,7 +75,9 @@ def joints(net: sumolib.net.Net) -> list[Joint]:
     found = []
     for gore in net.getEdges():
         arriving = [edge for edge in gore.getIncoming() if abs(turn(edge, gore)) < MAX_ANGLE]
-        through = max((edge for edge in arriving if not is_link(edge)), key=lambda edge: _rank(edge, gore), default=None)
+        through = max(
+            (edge for edge in arriving if not is_link(edge)), key=lambda edge: _rank(edge, gore), default=None
+        )
         if through is None or (typed and not any(edge.getType().endswith(ROADS) for edge in (through, gore))):
             continue
         if is_link(gore):
@@ -163,7 +165,7 @@ def _targets(edge: Edge, onward: Edge) -> dict[int, Lane]:
 def _lanes_at_gore(joint: Joint) -> tuple[Lane, Lane, Lane]:
     """The on-ramp's lane that merges, the lane it leads to after the gore, and the host's lane there."""
     own, through = _targets(joint.link, joint.gore), _targets(joint.through, joint.gore)
-    gore = joint.gore
+    gore, main = joint.gore, f"'{joint.through.getID()}'"
     where = f"edge '{joint.link.getID()}'"
     shared = sorted(set(own) & set(through))
     if shared:
@@ -172,11 +174,11 @@ def _lanes_at_gore(joint: Joint) -> tuple[Lane, Lane, Lane]:
         return own[lane], gore.getLane(lane), gore.getLane(lane)
     from_right = max(own) < min(through)
     if not from_right and min(own) < max(through):
-        raise UserError(f"{where} comes in between the lanes of '{joint.through.getID()}', neither right nor left of them")
+        raise UserError(f"{where} comes in between the lanes of {main}, neither right nor left of them")
     lane = max(own) if from_right else min(own)
     host = lane + 1 if from_right else lane - 1
     if host not in through:
-        raise UserError(f"{where}: no lane of '{joint.through.getID()}' leads to the lane beside it, {gore.getID()}_{host}")
+        raise UserError(f"{where}: no lane of {main} leads to the lane beside it, {gore.getID()}_{host}")
     return own[lane], gore.getLane(lane), gore.getLane(host)
 
 
@@ -196,8 +198,8 @@ def _beside(lane: Lane, main: list[Lane]) -> tuple[list[Lane], Lane | None, str]
         beside.append(further[0])
     length = sum(each.getLength() for each in beside)
     raise UserError(
-        f"the lane of '{lane.getID()}' goes on beside the road for {length:.0f} m, as far as was looked or the net "
-        "reaches: nobody has to merge; take a larger extract if it ends further on"
+        f"the on-ramp's lane {lane.getID()} goes on beside the road for {length:.0f} m, as far as was looked or the "
+        "net reaches: nobody has to merge; take a larger extract if it ends further on"
     )
 
 
@@ -251,10 +253,7 @@ def _into(lane: Lane, *edges: Edge) -> list[Lane]:
     """Lanes of the given edges that lead to a lane."""
     target = lane.getEdge()
     return [
-        link.getFromLane()
-        for edge in edges
-        for link in edge.getOutgoing().get(target, ())
-        if link.getToLane() is lane
+        link.getFromLane() for edge in edges for link in edge.getOutgoing().get(target, ()) if link.getToLane() is lane
     ]
 
 

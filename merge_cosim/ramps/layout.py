@@ -140,14 +140,10 @@ def _lines(lanes: Sequence[Lane]) -> list[FloatArray]:
         for lane, shape, onward in zip(lanes, shapes, shapes[1:], strict=False)
     ]
     starts, ends = [shapes[0][0], *joints], [*joints, shapes[-1][-1]]
-    return [
-        polyline.through([start, *shape, end]) for start, shape, end in zip(starts, shapes, ends, strict=True)
-    ]
+    return [polyline.through([start, *shape, end]) for start, shape, end in zip(starts, shapes, ends, strict=True)]
 
 
-def _roads(
-    lanes: Sequence[Lane], lines: Sequence[FloatArray], first: str, last: str, origin: FloatArray
-) -> list[Road]:
+def _roads(lanes: Sequence[Lane], lines: Sequence[FloatArray], first: str, last: str, origin: FloatArray) -> list[Road]:
     """Roads end to end between two named nodes."""
     inner = [lane.getEdge().getToNode().getID() for lane in lanes[:-1]]
     ends = zip(lanes, lines, [first, *inner], [*inner, last], strict=True)

@@ -159,7 +159,7 @@ def _definition(name: str, n: RampNumbers) -> RampFile:
         gore="merge" if beside else "main_out",
         merging_point=n.merging_point,
         speed_limit=n.speed_limit,
-        lengths=lengths | {edge: n.acceleration_lane for edge in beside},
+        lengths=lengths | dict.fromkeys(beside, n.acceleration_lane),
         sources={
             "geometry": "Designed: straight roads made by merge-cosim ramp new.",
             "merging_point": "Default: a fifth of the acceleration lane." if beside else "The gore.",
