@@ -101,7 +101,7 @@ def _read(path: Path, named: Path) -> sumolib.net.Net:
         more = "an extract of OpenStreetMap goes with --from-osm" if root.tag == "osm" else "give a .net.xml"
         raise UserError(f"{named}: its root is <{root.tag}>, not <net>; {more}")
     if root.get("lefthand", "false").lower() in ("true", "1", "yes"):
-        raise UserError(f"{named}: a net with left-hand traffic; mirror it first (netconvert --flip-y-axis)")
+        raise UserError(f"{named}: a net with left-hand traffic; only right-hand traffic can be read")
     try:
         return sumolib.net.readNet(str(path))
     except Exception as error:  # sumolib passes on whatever its parser meets

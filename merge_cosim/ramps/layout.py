@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,6 +16,8 @@ EXIT_LENGTH = 300.0
 """As much of an off-ramp is kept [m]."""
 MIN_EDGE = 10.0
 """A piece of road shorter than this at the end of a path is left out [m]."""
+SMOOTHING = 5.0
+"""Metres of road over which an offset of one metre is spread, on either side of a node."""
 HALF_NODE = 1.0
 """Half the length of a joining node's shape along the road [m]; netconvert stretches its own at shallow angles."""
 
@@ -137,10 +140,19 @@ def _lines(lanes: Sequence[Lane]) -> list[FloatArray]:
     shapes = [np.array(lane.getShape(), dtype=float) for lane in lanes]
     joints = [
         polyline.nearest_on(shape[-1], onward[0], np.array(lane.getEdge().getToNode().getCoord(), dtype=float))
-        for lane, shape, onward in zip(lanes, shapes, shapes[1:], strict=False)
+        for lane, (shape, onward) in zip(lanes, pairwise(shapes), strict=False)
+    ]
+    # Where the net's lanes are set off sideways at a node, the offset is spread over some road before and after it.
+    spread = [
+        SMOOTHING * abs(float((onward[0] - shape[-1]) @ polyline.left_of(polyline.directions(shape)[-1])))
+        for shape, onward in pairwise(shapes)
     ]
     starts, ends = [shapes[0][0], *joints], [*joints, shapes[-1][-1]]
-    return [polyline.through([start, *shape, end]) for start, shape, end in zip(starts, shapes, ends, strict=True)]
+    lines = []
+    for shape, start, end, before, after in zip(shapes, starts, ends, [0.0, *spread], [*spread, 0.0], strict=True):
+        far = (np.hypot(*(shape - start).T) >= before) & (np.hypot(*(shape - end).T) >= after)
+        lines.append(polyline.through([start, *shape[far], end]))
+    return lines
 
 
 def _roads(lanes: Sequence[Lane], lines: Sequence[FloatArray], first: str, last: str, origin: FloatArray) -> list[Road]:
