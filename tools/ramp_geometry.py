@@ -14,7 +14,8 @@ from geometry.plan import Plan
 from geometry.positions import positions
 from geometry.sites import i80, us101
 
-from merge_cosim.ramps.build import build, check
+from merge_cosim.ramps.build import build
+from merge_cosim.ramps.check import check
 from merge_cosim.ramps.definition import FILE_NAME, RampFile, read_ramp_file
 
 NETS = Path(__file__).parent.parent / "sumo_nets"

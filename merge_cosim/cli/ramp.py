@@ -44,15 +44,15 @@ def check_(which: Which, as_json: Json = False) -> None:
     """Say what is wrong with a ramp; exit status 1 if anything is."""
     import json
 
-    from merge_cosim.ramps.build import check
+    from merge_cosim.ramps.check import check, notes
     from merge_cosim.ramps.ramp import find_ramp
 
     folder = find_ramp(which)
-    problems = check(folder)
+    problems, remarks = check(folder), notes(folder)
     if as_json:
-        print(json.dumps({"folder": str(folder), "problems": problems}, indent=2))
+        print(json.dumps({"folder": str(folder), "problems": problems, "notes": remarks}, indent=2))
     else:
-        print("\n".join(problems) if problems else f"{folder}: no problem found")
+        print("\n".join([*(problems or [f"{folder}: no problem found"]), *remarks]))
     if problems:
         raise typer.Exit(1)
 
@@ -62,7 +62,8 @@ def build_(which: Which, as_json: Json = False) -> None:
     """Build a ramp's net from its plain XML sources with netconvert."""
     import json
 
-    from merge_cosim.ramps.build import build, check
+    from merge_cosim.ramps.build import build
+    from merge_cosim.ramps.check import check
     from merge_cosim.ramps.ramp import find_ramp
 
     folder = find_ramp(which)
@@ -89,28 +90,44 @@ def edit(which: Which) -> None:
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The new ramp's name.")],
     out: Annotated[Path, typer.Option("--out", help="Folder in which the ramp's folder is made.")],
-    lanes: Annotated[int, typer.Option(min=1, help="Main lanes.")] = 1,
-    ramp_lanes: Annotated[int, typer.Option(min=1, help="Lanes of the on-ramp.")] = 1,
+    from_net: Annotated[Path | None, typer.Option(help="A SUMO net with an on-ramp (.net.xml, .net.xml.gz).")] = None,
+    from_osm: Annotated[
+        Path | None, typer.Option(help="An extract of OpenStreetMap with an on-ramp (.osm, .osm.gz).")
+    ] = None,
+    link: Annotated[
+        str | None, typer.Option(metavar="EDGE", help="An edge of the on-ramp, where the file has several.")
+    ] = None,
+    lanes: Annotated[int | None, typer.Option(min=1, help="Main lanes (1).")] = None,
+    ramp_lanes: Annotated[int | None, typer.Option(min=1, help="Lanes of the on-ramp (1).")] = None,
     acceleration_lane: Annotated[
-        float, typer.Option(min=0.0, help="Its length [m]; 0: the on-ramp and the host's lane go on as one.")
-    ] = 0.0,
-    upstream: Annotated[float, typer.Option(min=1.0, help="Road and on-ramp before the gore [m].")] = 500.0,
-    downstream: Annotated[float, typer.Option(min=1.0, help="Road after the gore [m].")] = 1500.0,
-    speed_limit: Annotated[float, typer.Option(min=1.0, help="Speed limit [m/s].")] = 29.0,
-    lane_width: Annotated[float, typer.Option(min=2.0, help="Width of every lane [m].")] = 3.6,
+        float | None, typer.Option(min=0.0, help="Its length [m] (0: on-ramp and host's lane go on as one).")
+    ] = None,
+    upstream: Annotated[float | None, typer.Option(min=1.0, help="Road and on-ramp before the gore [m] (500).")] = None,
+    downstream: Annotated[float | None, typer.Option(min=1.0, help="Road after the gore [m] (1500).")] = None,
+    speed_limit: Annotated[float | None, typer.Option(min=1.0, help="Speed limit [m/s] (29, or the file's).")] = None,
+    lane_width: Annotated[float | None, typer.Option(min=2.0, help="Width of every lane [m] (3.6).")] = None,
     as_json: Json = False,
 ) -> None:
-    """Start a ramp of your own from a few numbers."""
+    """Start a ramp of your own: from a few numbers, a SUMO net, or an extract of OpenStreetMap."""
     import json
 
-    from merge_cosim.ramps.build import check
-    from merge_cosim.ramps.new import RampNumbers, new_ramp
+    from merge_cosim.ramps.check import check, notes
+    from merge_cosim.ramps.start import start_ramp
 
-    numbers = RampNumbers(lanes, ramp_lanes, acceleration_lane, upstream, downstream, speed_limit, lane_width)
-    folder = new_ramp(out / name, numbers)
-    problems = check(folder)
+    numbers = {
+        "lanes": lanes,
+        "ramp_lanes": ramp_lanes,
+        "acceleration_lane": acceleration_lane,
+        "upstream": upstream,
+        "downstream": downstream,
+        "speed_limit": speed_limit,
+        "lane_width": lane_width,
+    }
+    given = {key: value for key, value in numbers.items() if value is not None}
+    folder, found = start_ramp(out / name, given, from_net, from_osm, link)
+    problems, remarks = check(folder), notes(folder)
     if as_json:
-        print(json.dumps({"folder": str(folder), "problems": problems}, indent=2))
+        print(json.dumps({"folder": str(folder), "found": found, "problems": problems, "notes": remarks}, indent=2))
         return
-    print("\n".join([f"wrote {folder}", *problems]))
+    print("\n".join([f"wrote {folder}", *found, *problems, *remarks]))
     print(f"Change it with: merge-cosim ramp edit {folder}")

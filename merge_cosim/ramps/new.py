@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from merge_cosim.errors import UserError
-from merge_cosim.files import shipped
-from merge_cosim.ramps.build import build
-from merge_cosim.ramps.definition import FILE_NAME
-from merge_cosim.ramps.view import ROLES, copy_view
+from merge_cosim.ramps.definition import RampFile
+from merge_cosim.ramps.folder import document, require_new, write_ramp
+from merge_cosim.ramps.view import ROLES
 
-PATTERN = "designed"
-"""The shipped ramp whose netconvert configuration and view new ones take over."""
 ANGLE = math.radians(5.0)
 """Between on-ramp and main road."""
-HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 
 @dataclass(frozen=True)
@@ -45,8 +40,13 @@ class RampNumbers:
 
     @property
     def merging_point(self) -> float:
-        """Default merging point [m past the gore]: a fifth of the acceleration lane, about as on US-101."""
-        return float(round(self.acceleration_lane / 5))
+        """Default merging point [m past the gore]."""
+        return default_merging_point(self.acceleration_lane)
+
+
+def default_merging_point(acceleration_lane: float) -> float:
+    """A fifth of the acceleration lane [m past the gore], about as on US-101."""
+    return float(round(acceleration_lane / 5))
 
 
 def new_ramp(folder: Path, numbers: RampNumbers) -> Path:
@@ -55,30 +55,14 @@ def new_ramp(folder: Path, numbers: RampNumbers) -> Path:
     Raises:
         UserError: The folder exists and is not empty, its name is no plain word, or the numbers make no ramp.
     """
-    name = folder.name
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
-        raise UserError(f"{folder}: '{name}' is no name for a ramp; use letters, digits, '-' and '_'")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UserError(f"{folder}: exists already; choose another name or folder")
+    require_new(folder)
     if numbers.ramp_lanes > 1 and not numbers.acceleration_lane:
         raise UserError(f"{folder}: {numbers.ramp_lanes} ramp lanes cannot end in one lane; give --acceleration-lane")
     if numbers.acceleration_lane >= numbers.downstream:
         raise UserError(f"{folder}: the acceleration lane is as long as the road; make --downstream longer")
-    folder.mkdir(parents=True, exist_ok=True)
-    source = shipped("sumo_nets") / PATTERN
-    settings = (source / f"{PATTERN}.netccfg").read_text(encoding="utf-8")
-    files = {
-        f"{name}.nod.xml": _nodes(numbers),
-        f"{name}.edg.xml": _edges(numbers),
-        f"{name}.con.xml": _connections(numbers),
-        f"{name}.netccfg": settings.replace(PATTERN, name),
-        FILE_NAME: _definition(name, numbers),
-    }
-    for file, text in files.items():
-        (folder / file).write_text(text, encoding="utf-8")
-    copy_view(source, folder)
-    build(folder)
-    return folder
+    return write_ramp(
+        folder, _nodes(numbers), _edges(numbers), _connections(numbers), _definition(folder.name, numbers)
+    )
 
 
 def _nodes(n: RampNumbers) -> str:
@@ -96,7 +80,7 @@ def _nodes(n: RampNumbers) -> str:
         shape = " ".join(f"{a:.2f},{b:.2f}" for a, b in corners)
         rows.append(f'<node id="{name}" x="{at:.2f}" y="0.00" type="{type_}" radius="1" shape="{shape}"/>')
     rows.append(f'<node id="main_end" x="{n.downstream:.2f}" y="{axis:.2f}" type="dead_end"/>')
-    return _document(
+    return document(
         "nodes",
         "Metres; x runs along the road and is 0 at the gore, y is 0 on the axis of the host lane. Joining nodes carry "
         "a shape 2 m long, because netconvert stretches its own at shallow angles.",
@@ -116,7 +100,7 @@ def _edges(n: RampNumbers) -> str:
         lanes = ["auxiliary"] * n.ramp_lanes + main
         rows += _edge(n, "merge", "gore", "lane_end", [(0.0, middle), (end, middle)], lanes)
     rows += _edge(n, "main_out", onward, "main_end", [(end, axis), (n.downstream, axis)], main)
-    return _document(
+    return document(
         "edges",
         "Each shape is the axis of its edge (spreadType center); length is what SUMO drives and equals the distance "
         "along the axis, node to node.",
@@ -148,7 +132,7 @@ def _connections(n: RampNumbers) -> str:
     rows = [
         f'<connection from="{start}" fromLane="{lane}" to="{end}" toLane="{onto}"/>' for start, lane, end, onto in links
     ]
-    return _document("connections", "Every connection there is: lane 0 is the right-most lane.", rows)
+    return document("connections", "Every connection there is: lane 0 is the right-most lane.", rows)
 
 
 def _ramp_end(n: RampNumbers) -> float:
@@ -160,37 +144,24 @@ def _ramp_start(n: RampNumbers) -> tuple[float, float]:
     return -n.upstream * math.cos(ANGLE), _ramp_end(n) - n.upstream * math.sin(ANGLE)
 
 
-def _document(root: str, comment: str, rows: list[str]) -> str:
-    lines = [f"<{root}>", f"    <!-- {comment} -->", *(f"    {row}" for row in rows), f"</{root}>"]
-    return HEAD + "\n".join(lines) + "\n"
-
-
-def _definition(name: str, n: RampNumbers) -> str:
+def _definition(name: str, n: RampNumbers) -> RampFile:
     """Contents of `ramp.toml`."""
-    lengths = {"main_in": n.upstream, "ramp": n.upstream}
-    if n.acceleration_lane:
-        lengths["merge"] = n.acceleration_lane
-        main, host = '"main_in", "merge", "main_out"', f"0, {n.ramp_lanes}, 0"
-        ramp, merging, gore = '"ramp", "merge"', f"{n.ramp_lanes - 1}, {n.ramp_lanes - 1}", "merge"
-    else:
-        main, host, ramp, merging, gore = '"main_in", "main_out"', "0, 0", '"ramp"', "0", "main_out"
-    lengths["main_out"] = n.downstream - n.acceleration_lane
-    rows = [
-        f'title = "{name}"',
-        f'net = "{name}.net.xml"',
-        "",
-        f"main = [{main}]",
-        f"host_lane = [{host}]   # SUMO counts from the right",
-        f"ramp = [{ramp}]",
-        f"merging_lane = [{merging}]",
-        f'gore = "{gore}"   # x = 0 at the start of this edge',
-        f"merging_point = {n.merging_point}   # m past the gore",
-        f"speed_limit = {n.speed_limit}   # m/s",
-        "",
-        "[lengths]   # m",
-        *(f"{edge} = {length}" for edge, length in lengths.items()),
-        "",
-        "[sources]",
-        'geometry = "Designed: straight roads made by merge-cosim ramp new."',
-    ]
-    return "\n".join(rows) + "\n"
+    beside = ["merge"] if n.acceleration_lane else []
+    own = n.ramp_lanes - 1
+    lengths = {"main_in": n.upstream, "ramp": n.upstream, "main_out": n.downstream - n.acceleration_lane}
+    return RampFile(
+        title=name,
+        net=f"{name}.net.xml",
+        main=["main_in", *beside, "main_out"],
+        host_lane=[0, n.ramp_lanes, 0] if beside else [0, 0],
+        ramp=["ramp", *beside],
+        merging_lane=[own] * (1 + len(beside)),
+        gore="merge" if beside else "main_out",
+        merging_point=n.merging_point,
+        speed_limit=n.speed_limit,
+        lengths=lengths | dict.fromkeys(beside, n.acceleration_lane),
+        sources={
+            "geometry": "Designed: straight roads made by merge-cosim ramp new.",
+            "merging_point": "Default: a fifth of the acceleration lane." if beside else "The gore.",
+        },
+    )

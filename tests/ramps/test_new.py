@@ -6,7 +6,7 @@ import pytest
 import sumolib
 
 from merge_cosim.errors import UserError
-from merge_cosim.ramps.build import check
+from merge_cosim.ramps.check import check
 from merge_cosim.ramps.new import RampNumbers, new_ramp
 from merge_cosim.ramps.ramp import LanePosition, Ramp
 from merge_cosim.ramps.tiles import tile_net
