@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -134,8 +135,9 @@ class LoggedTraffic:
         candidates = self._driven[[self._names[car] not in keep for car in self._driven]]
         cars, free = self._free_places()
         found = np.zeros(len(candidates), dtype=bool)
-        for cycle in (self._cycle, self._cycle + 1):
-            logged = self._logged_places(candidates, cycle)
+        for ahead_by in (0, 1):
+            logged = self._logged_places(candidates, self._cycle + ahead_by)
+            free = replace(free, x=free.x + ahead_by * DT * free.speed)
             found |= in_conflict(logged, free, self._drivers.min_gap, self._drivers.decel)
             for at in (k for k, car in enumerate(cars) if self._names[car] == host):
                 found |= near(logged, int(free.lane[at]), float(free.x[at]), ahead, behind)
