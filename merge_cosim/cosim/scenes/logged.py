@@ -14,7 +14,7 @@ from merge_cosim.cosim.scenes.roadway import Roadway, Strip
 from merge_cosim.cosim.session import LANE_CHANGE_MODE_NONE, SPEED_MODE_UNCHECKED
 from merge_cosim.ngsim.scenes import LoggedScene
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.units import DT, FloatArray, IntArray
+from merge_cosim.units import DT, BoolArray, FloatArray, IntArray
 
 SPEED_MODE_CHECKED = 31
 """SUMO's default: all checks."""
@@ -36,8 +36,7 @@ class LoggedTraffic:
     Attributes:
         released: Names of the cars that were handed to SUMO, in that order.
         taken: Names of the cars that somebody else drives.
-        blocked: Names of the cars that never came in: a released or taken car was in their place, or was they
-            themselves (a car whose log has a gap comes back as another part).
+        blocked: Names of the cars that did not come in: a car off its log was too close, or is an earlier part of them.
     """
 
     def __init__(self, api: Any, scene: LoggedScene, ramp: Ramp, drivers: ReleasedDrivers | None = None) -> None:
@@ -138,7 +137,7 @@ class LoggedTraffic:
         for ahead_by in (0, 1):
             logged = self._logged_places(candidates, self._cycle + ahead_by)
             free = replace(free, x=free.x + ahead_by * DT * free.speed)
-            found |= in_conflict(logged, free, self._drivers.min_gap, self._drivers.decel)
+            found |= self._conflicts(logged, free).any(axis=1)
             for at in (k for k, car in enumerate(cars) if self._names[car] == host):
                 found |= near(logged, int(free.lane[at]), float(free.x[at]), ahead, behind)
         names = [self._names[car] for car in candidates[found]]
@@ -150,11 +149,14 @@ class LoggedTraffic:
         """Of the cars whose log starts, those that have room, and are not in the net already in another part."""
         if not self._off_log or not len(coming):
             return coming
-        places = self._logged_places(coming, cycle)
-        refused = in_conflict(places, self._free_places()[1], self._drivers.min_gap, self._drivers.decel)
+        places, free = self._logged_places(coming, cycle), self._free_places()[1]
+        refused = self._conflicts(places, free).any(axis=1) | self._conflicts(free, places).any(axis=0)
         refused |= np.isin(self._scene.vehicle[coming], self._scene.vehicle[self._off_log])
         self.blocked += [self._names[car] for car in coming[refused]]
         return coming[~refused]
+
+    def _conflicts(self, cars: Places, others: Places) -> BoolArray:
+        return in_conflict(cars, others, self._drivers.min_gap, self._drivers.decel)
 
     def _let_go(self, name: str) -> None:
         car = self._scene.index(name)

@@ -29,28 +29,28 @@ class Places:
         return len(self.x)
 
 
-def in_conflict(logged: Places, free: Places, min_gap: float, decel: float) -> BoolArray:
-    """Which logged cars overlap a free one in their lane, or follow one too closely to brake for it.
+def in_conflict(cars: Places, others: Places, min_gap: float, decel: float) -> BoolArray:
+    """Which cars overlap which others in their lane, or follow them too closely to brake for them.
 
-    Too closely is a gap of less than `min_gap` + v dt + (v^2 - u^2) / (2 decel), where u is the speed of the free car
-    and the last term counts if the logged car is faster.
+    Too closely is a gap of less than `min_gap` + v dt + (v^2 - u^2) / (2 decel), where u is the speed of the car ahead
+    and the last term counts if the one behind is faster.
 
     Args:
-        logged: Cars on their logs, n of them.
-        free: Cars off their logs, m of them.
+        cars: n cars.
+        others: m cars.
         min_gap: Gap that is left at standstill [m].
-        decel: How hard the follower brakes [m/s^2].
+        decel: How hard the car behind brakes [m/s^2].
 
     Returns:
-        Shape (n,).
+        Shape (n, m).
     """
-    ahead = free.x[None, :] - logged.x[:, None]
-    gap = ahead - free.length[None, :]
-    faster = np.maximum(logged.speed[:, None] ** 2 - free.speed[None, :] ** 2, 0.0)
-    needed = min_gap + logged.speed[:, None] * DT + faster / (2.0 * decel)
+    ahead = others.x[None, :] - cars.x[:, None]
+    gap = ahead - others.length[None, :]
+    faster = np.maximum(cars.speed[:, None] ** 2 - others.speed[None, :] ** 2, 0.0)
+    needed = min_gap + cars.speed[:, None] * DT + faster / (2.0 * decel)
     follows = (ahead >= 0.0) & (gap < needed)
-    overlaps = (ahead < 0.0) & (-ahead < logged.length[:, None] - TOLERANCE)
-    return np.any((logged.lane[:, None] == free.lane[None, :]) & (follows | overlaps), axis=1)
+    overlaps = (ahead < 0.0) & (-ahead < cars.length[:, None] - TOLERANCE)
+    return (cars.lane[:, None] == others.lane[None, :]) & (follows | overlaps)
 
 
 def near(logged: Places, lane: int, x: float, ahead: float, behind: float) -> BoolArray:

@@ -203,8 +203,10 @@ def test_no_car_comes_in_where_another_stands_nor_twice() -> None:
     scene = scene_of(
         steady(1, [3] * 10, at=0),
         steady(1, [3] * 10, at=0, frame=20, part=2),  # its log goes on after a gap
-        steady(2, [3] * 10, at=-35.0, frame=20),  # 1.5 m behind it when it comes in
+        steady(2, [3] * 10, at=-35.0, frame=20),  # close behind it when it comes in
         steady(3, [3] * 10, at=-200.0, frame=20),
+        steady(4, [3] * 10, at=-23.0, frame=20),  # close ahead of it
+        steady(5, [3] * 10, at=-15.0, frame=20),
     )
     traffic = LoggedTraffic(libsumo, scene, RAMP)
     for cycle in range(scene.cycles):
@@ -213,5 +215,5 @@ def test_no_car_comes_in_where_another_stands_nor_twice() -> None:
         if cycle == 1:
             traffic.take_over("1.1")
             libsumo.vehicle.setSpeed("1.1", 0.0)
-    assert sorted(traffic.blocked) == ["1.2", "2.1"]
-    assert sorted(shown()) == ["1.1", "3.1"]
+    assert sorted(traffic.blocked) == ["1.2", "2.1", "4.1"]
+    assert sorted(shown()) == ["1.1", "3.1", "5.1"]
