@@ -30,7 +30,12 @@ COLUMNS = ("episode", "frame", "car", "station_m", "speed_m_s")
 
 
 def read_episodes(path: Path, rules: PairRules, first: int = EPISODES_FROM) -> Paired:
-    """Pair the merging car of each episode with the nearest cars ahead and behind at its end, the lane change.
+    """Pair the merging car of each episode with the nearest cars ahead and behind at its end; see `episode_tracks`."""
+    return pair_tracks(episode_tracks(path, rules, first), US101, rules, source="ngsim")
+
+
+def episode_tracks(path: Path, rules: PairRules, first: int = EPISODES_FROM) -> Tracks:
+    """Read the cars of the episodes: the merging car, in the host lane in its last row alone, and its neighbours there.
 
     Every length is missing. The episodes' positions carry no jitter (their second differences are as small as those
     of smoothed NGSIM positions, half of raw ones), so all are flagged `smoothed_source`.
@@ -63,7 +68,7 @@ def read_episodes(path: Path, rules: PairRules, first: int = EPISODES_FROM) -> P
     changes &= car == 0
     smooth = smooth_tracks(station, offsets, rules.smoothing_window, rules.smoothing_order)
     starts = offsets[:-1]
-    tracks = Tracks(
+    return Tracks(
         recording=np.array([f"episode-{number:g}" for number in episode[starts]], dtype=object),
         vehicle=car[starts].astype(np.int64),
         part=np.ones(len(starts), dtype=np.int64),
@@ -74,9 +79,9 @@ def read_episodes(path: Path, rules: PairRules, first: int = EPISODES_FROM) -> P
         speed=speed,
         on_ramp=(car == 0) & ~changes,
         in_host=(car != 0) | changes,
+        lane=np.where((car != 0) | changes, US101.host_lane, US101.ramp_lanes[0]),
         smoothed=np.ones(len(order), dtype=bool),
     )
-    return pair_tracks(tracks, US101, rules, source="ngsim")
 
 
 def _columns(path: Path) -> dict[str, FloatArray]:

@@ -16,6 +16,7 @@ class Site:
         location: Value of the portal's `Location` column.
         ramp_lanes: Lanes from which cars merge.
         host_lane: The main lane that they merge into.
+        exit_lanes: Lanes that go on from `ramp_lanes` to an off-ramp.
         gore_y: Local_Y [m] where the on-ramp joins the main road.
         length: Length of the study area [m].
         global_x, global_y: Range of the global coordinates (California State Plane, NAD83, US survey feet) that holds
@@ -27,10 +28,16 @@ class Site:
     location: str
     ramp_lanes: tuple[int, ...]
     host_lane: int
+    exit_lanes: tuple[int, ...]
     gore_y: float
     length: float
     global_x: tuple[float, float]
     global_y: tuple[float, float]
+
+    @property
+    def side_lanes(self) -> tuple[int, ...]:
+        """The lanes beside the main road, which are one path: on-ramp, auxiliary lane, off-ramp."""
+        return self.ramp_lanes + self.exit_lanes
 
 
 US101 = Site(
@@ -39,6 +46,7 @@ US101 = Site(
     location="us-101",
     ramp_lanes=(6, 7),
     host_lane=5,
+    exit_lanes=(8,),
     gore_y=613 * FOOT,
     length=640.0,
     global_x=(6_450_700.0, 6_453_200.0),
@@ -51,6 +59,7 @@ I80 = Site(
     location="i-80",
     ramp_lanes=(7,),
     host_lane=6,
+    exit_lanes=(),
     gore_y=591 * FOOT,
     length=503.0,
     global_x=(6_041_500.0, 6_044_500.0),

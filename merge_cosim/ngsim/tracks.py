@@ -26,6 +26,8 @@ class Tracks:
         speed: Logged speed [m/s], shape (rows,).
         on_ramp: In an on-ramp lane, shape (rows,).
         in_host: In the host lane, flicker removed, shape (rows,).
+        lane: NGSIM's lane number, flicker removed, shape (rows,). The lanes beside the main road (on-ramp, auxiliary
+            lane, off-ramp) are one path and all have the number of the site's first on-ramp lane.
         smoothed: Smoothed by the source before it was published, shape (rows,).
     """
 
@@ -39,6 +41,7 @@ class Tracks:
     speed: FloatArray
     on_ramp: BoolArray
     in_host: BoolArray
+    lane: IntArray
     smoothed: BoolArray
 
     def __len__(self) -> int:
@@ -68,8 +71,8 @@ class Tracks:
         return track, change[inside][first]
 
 
-def build_tracks(table: pa.Table, site: Site, rules: PairRules) -> Tracks:
-    """Take the tracks that touch an on-ramp lane or the host lane out of a canonical trajectory table.
+def build_tracks(table: pa.Table, site: Site, rules: PairRules, *, everywhere: bool = False) -> Tracks:
+    """Take the tracks that touch an on-ramp lane or the host lane, or all, out of a canonical trajectory table.
 
     A track ends where its key changes and at every gap between frames, so nothing is smoothed or paired across one.
 
@@ -77,6 +80,7 @@ def build_tracks(table: pa.Table, site: Site, rules: PairRules) -> Tracks:
         table: Trajectories of one site, sorted by recording, vehicle, part and frame.
         site: Its lanes.
         rules: Filter and flicker time.
+        everywhere: Also take the tracks that touch neither lane.
     """
     lane = table["lane"].to_numpy()
     frame = table["frame"].to_numpy()
@@ -90,10 +94,11 @@ def build_tracks(table: pa.Table, site: Site, rules: PairRules) -> Tracks:
     starts = np.flatnonzero(starts_here)
     near = np.isin(lane, (*site.ramp_lanes, site.host_lane))
     lengths = np.diff(np.append(starts, len(lane)))
-    wanted = np.logical_or.reduceat(near, starts) if len(starts) else np.empty(0, dtype=bool)
+    wanted = np.logical_or.reduceat(near | everywhere, starts) if len(starts) else np.empty(0, dtype=bool)
     rows = np.flatnonzero(np.repeat(wanted, lengths))
     starts, lengths = starts[wanted], lengths[wanted]
     offsets = np.append(0, np.cumsum(lengths)).astype(np.int64)
+    path = np.where(np.isin(lane[rows], site.side_lanes), site.ramp_lanes[0], lane[rows]).astype(np.int64)
     return Tracks(
         recording=np.asarray(recording.dictionary.to_pylist(), dtype=object)[codes[starts]],
         vehicle=vehicle[starts].astype(np.int64),
@@ -105,6 +110,7 @@ def build_tracks(table: pa.Table, site: Site, rules: PairRules) -> Tracks:
         speed=np.asarray(table["speed"].to_numpy()[rows], dtype=np.float64),
         on_ramp=np.isin(lane[rows], site.ramp_lanes),
         in_host=without_flicker(lane[rows] == site.host_lane, offsets, cycles(rules.hold)),
+        lane=steady_lanes(path, offsets, cycles(rules.hold)),
         smoothed=table["smoothed"].to_numpy()[rows],
     )
 
@@ -120,14 +126,36 @@ def without_flicker(in_lane: BoolArray, offsets: IntArray, hold: int) -> BoolArr
         offsets: Where each track starts, shape (n + 1,).
         hold: Shortest run that counts [cycles].
     """
-    if not len(in_lane):
-        return in_lane
-    begins = np.zeros(len(in_lane), dtype=bool)
-    begins[1:] = in_lane[1:] != in_lane[:-1]
+    run, end = _runs(in_lane, offsets)
+    departed = ~in_lane[run] & np.isin(end, offsets)
+    return _last_that_counts(in_lane, run, end, (end - run >= hold) | np.isin(run, offsets) | departed)
+
+
+def steady_lanes(lane: IntArray, offsets: IntArray, hold: int) -> IntArray:
+    """Ignore changes of lane that do not last, whichever the lanes; a merge is where `without_flicker` has it.
+
+    A run of equal lanes counts if it lasts `hold` cycles or if its track begins with it. A shorter run takes the lane
+    of the last one that counts, at the end of a track, too: whether the car would have stayed is not known.
+
+    Args:
+        lane: Lane numbers as logged, tracks end to end, shape (rows,).
+        offsets: Where each track starts, shape (n + 1,).
+        hold: Shortest run that counts [cycles].
+    """
+    run, end = _runs(lane, offsets)
+    return _last_that_counts(lane, run, end, (end - run >= hold) | np.isin(run, offsets))
+
+
+def _runs(values: AnyArray, offsets: IntArray) -> tuple[IntArray, IntArray]:
+    """Rows where runs of equal values start, and the rows after their last ones; no run passes from track to track."""
+    begins = np.zeros(len(values), dtype=bool)
+    begins[1:] = values[1:] != values[:-1]
     begins[offsets[:-1]] = True
     run = np.flatnonzero(begins)
-    end = np.append(run[1:], len(in_lane))
-    departed = ~in_lane[run] & np.isin(end, offsets)
-    counts = (end - run >= hold) | np.isin(run, offsets) | departed
+    return run, np.append(run[1:], len(values))[: len(run)]
+
+
+def _last_that_counts(values: AnyArray, run: IntArray, end: IntArray, counts: BoolArray) -> AnyArray:
+    """Give each run the value of the last one up to it that counts."""
     source = np.maximum.accumulate(np.where(counts, np.arange(len(run)), 0))
-    return np.repeat(in_lane[run][source], end - run)
+    return np.repeat(values[run][source], end - run)

@@ -2,11 +2,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from trajectory_tables import GORE, steady, table
 
 from merge_cosim.ngsim.rules import PairRules
 from merge_cosim.ngsim.sites import US101
-from merge_cosim.ngsim.tracks import build_tracks, without_flicker
+from merge_cosim.ngsim.tracks import build_tracks, steady_lanes, without_flicker
 
 
 def flicker(lanes: str, hold: int = 5) -> str:
@@ -73,3 +75,30 @@ def test_leaving_the_host_lane() -> None:
     cars = table(steady(1, [5] * 10 + [4] * 10, at=0), steady(2, [5] * 10, at=0))
     tracks = build_tracks(cars, US101, PairRules())
     np.testing.assert_array_equal(tracks.leaves(np.array([0, 0, 1]), np.array([0, 12, 20])), [10, 12, 30])
+
+
+@pytest.mark.parametrize(
+    ("logged", "kept"),
+    [
+        ("2222211111", "2222211111"),
+        ("3333344333", "3333333333"),  # there and back
+        ("333334422222", "333333322222"),  # on the way to another lane
+        ("66666566655555", "66666666655555"),  # the first change that holds, as for the pairs
+        ("55555666", "55555555"),  # not known to hold
+        ("1 22222 2", "1 22222 2"),  # a track begins where it begins
+    ],
+)
+def test_flicker_between_any_lanes(logged: str, kept: str) -> None:
+    tracks = logged.split()
+    offsets = np.concatenate([[0], np.cumsum([len(track) for track in tracks])])
+    lanes = steady_lanes(np.array([int(lane) for lane in "".join(tracks)]), offsets, 5)
+    assert " ".join("".join(map(str, lanes[a:b])) for a, b in pairwise(offsets)) == kept
+
+
+@given(st.lists(st.sampled_from([4, 5, 6]), min_size=1, max_size=12), st.lists(st.integers(1, 9), min_size=12))
+def test_a_car_comes_into_the_host_lane_alike_by_both_rules(lanes: list[int], lengths: list[int]) -> None:
+    lane = np.repeat([6, *lanes], [1, *lengths[: len(lanes)]])
+    offsets = np.array([0, len(lane)])
+    among_all = steady_lanes(lane, offsets, 5) == 5
+    alone = without_flicker(lane == 5, offsets, 5)
+    assert np.argmax(among_all) == np.argmax(alone)
