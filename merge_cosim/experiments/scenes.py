@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,15 +14,18 @@ from typing import Any, Self
 import numpy as np
 import pyarrow as pa
 
+from merge_cosim.control.acc import Acc
 from merge_cosim.cosim.loop import Effort
-from merge_cosim.cosim.scenes.meetings import Ending
+from merge_cosim.cosim.scenes.meetings import Ending, Meeting
 from merge_cosim.cosim.scenes.run import Scene, SceneRun, run_scene
 from merge_cosim.cosim.scenes.scoring import encounters_of, score, to_be_scored
+from merge_cosim.cosim.scoring import Rules
 from merge_cosim.experiments.outcome import SCHEMA, result_rows
 from merge_cosim.experiments.scenario import Routes, Traffic
 from merge_cosim.experiments.statistics.summary import TRAFFIC
 from merge_cosim.experiments.store import SCENE_FACTS
-from merge_cosim.experiments.work import Task, Workplace
+from merge_cosim.experiments.work import Task, Workplace, free_law
+from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.route_reader import Configuration
 from merge_cosim.traffic.demand import write_traffic
@@ -120,19 +123,43 @@ class SceneBatch(Task):
 
     def rows(self, run: SceneRun, scene: Scene) -> pa.Table:
         """One result row for each meeting in which the car merged next to the host."""
-        meetings = to_be_scored(run.meetings)
-        encounters = encounters_of(meetings, scene.name, scene.ramp.name, TRAFFIC)
-        scored, others = score(meetings, encounters, self.scenario.test)
-        unfinished = ~scored.columns["scored_to_end"] & (scored.columns["kind"] == 0)
-        cut_off = np.array([meeting.ending is Ending.CENSORED for meeting in meetings], dtype=bool)
-        more = {
-            **{name: pa.array(values, mask=~np.isfinite(values)) for name, values in others.items()},
-            "censored": unfinished & cut_off,
-            "merging_stopped": np.array([meeting.stopped for meeting in meetings], dtype=bool),
-        }
-        return result_rows(scored, encounters, self.setting(scene.ramp), self.free_law(), self.names, more)
+        rules, setting, law = self.scenario.test, self.setting(scene.ramp), free_law(self.method)
+        return meeting_rows(run.meetings, scene.name, scene.ramp, rules, setting, law, self.names)
 
     def facts(self, run: SceneRun, scene: Scene) -> dict[str, Any]:
         """What there is to say of a scene as a whole."""
         notes = [(str(event), line) for event, line in run.notes]
         return {**self.names, "scene": scene.name, "seed": scene.seed, **run.facts, "notes": notes}
+
+
+def meeting_rows(
+    meetings: Sequence[Meeting],
+    scene: str,
+    ramp: Ramp,
+    rules: Rules,
+    setting: Setting,
+    law: Acc,
+    names: dict[str, str],
+) -> pa.Table:
+    """Result rows of the meetings in which the car merged next to the host, one each.
+
+    Args:
+        meetings: All meetings of a scene.
+        scene: Name of the scene.
+        ramp: Where it was.
+        rules: How they are scored.
+        setting: Speed of free driving and cycle.
+        law: The law whose free driving delays are measured against.
+        names: `scenario`, `variation`, `method` and `model` of all rows.
+    """
+    chosen = to_be_scored(meetings)
+    encounters = encounters_of(chosen, scene, ramp.name, TRAFFIC)
+    scored, others = score(chosen, encounters, rules)
+    unfinished = ~scored.columns["scored_to_end"] & (scored.columns["kind"] == 0)
+    cut_off = np.array([meeting.ending is Ending.CENSORED for meeting in chosen], dtype=bool)
+    more = {
+        **{name: pa.array(values, mask=~np.isfinite(values)) for name, values in others.items()},
+        "censored": unfinished & cut_off,
+        "merging_stopped": np.array([meeting.stopped for meeting in chosen], dtype=bool),
+    }
+    return result_rows(scored, encounters, setting, law, names, more)

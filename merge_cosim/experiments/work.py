@@ -95,13 +95,6 @@ class Task(ABC):
         """Speed limit and cycle."""
         return Setting(speed_limit=self.scenario.speed_limit or ramp.speed_limit)
 
-    def free_law(self) -> Acc:
-        """The law whose free driving delays are measured against."""
-        settings = {key.partition(".")[2]: value for key, value in self.method.settings if key.startswith("acc.")}
-        law = controllers.build("acc", settings, self.method.name)
-        assert isinstance(law, Acc)
-        return law
-
 
 @dataclass(frozen=True, kw_only=True)
 class Batch(Task):
@@ -192,4 +185,12 @@ def simulate_batch(batch: Batch, plant: Plant, ramp: Ramp, traced: Sequence[int]
 
 def rows_of(batch: Batch, run: Run, ramp: Ramp) -> pa.Table:
     """The result rows of a batch's run."""
-    return result_rows(run, batch.encounters, batch.setting(ramp), batch.free_law(), batch.names)
+    return result_rows(run, batch.encounters, batch.setting(ramp), free_law(batch.method), batch.names)
+
+
+def free_law(method: Method) -> Acc:
+    """The law whose free driving delays are measured against, with what was set of it."""
+    settings = {key.partition(".")[2]: value for key, value in method.settings if key.startswith("acc.")}
+    law = controllers.build("acc", settings, method.name)
+    assert isinstance(law, Acc)
+    return law

@@ -1,0 +1,104 @@
+"""A method as a step listener in a user's own script, which starts and steps SUMO itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import traci
+
+from merge_cosim.cosim.scenes.controller import HostController
+from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention
+from merge_cosim.cosim.scoring import Rules
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.methods import Method
+from merge_cosim.experiments.plan import default_model
+from merge_cosim.experiments.scenes import meeting_rows
+from merge_cosim.experiments.statistics.summary import TRAFFIC
+from merge_cosim.experiments.work import free_law
+from merge_cosim.intention.model import IntentionModel
+from merge_cosim.observation import Setting
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.units import DT, TOLERANCE
+
+
+class HostListener(traci.StepListener):  # type: ignore[misc]
+    """Drives every host of a simulation by a method, after each of the user's `simulationStep()`.
+
+    Hosts are the vehicles whose type carries the parameter `merge-cosim.role` = `host`. SUMO runs with steps of 0.1 s
+    and `--no-internal-links true`.
+
+    Attributes:
+        controller: What drives; its `finished` meetings and its `notes` grow as the simulation goes on.
+    """
+
+    def __init__(
+        self,
+        api: Any,
+        ramp: str | Path,
+        method: str,
+        *,
+        model: str | None = None,
+        settings: Mapping[str, Any] | None = None,
+        speed_limit: float | None = None,
+        host: str = "",
+        attention: Attention = DEFAULT_ATTENTION,
+        rules: Rules | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Take the wheel in a simulation that has been started.
+
+        Args:
+            api: The module libsumo or traci, or a connection of traci.
+            ramp: Name of a shipped ramp, or a folder with `ramp.toml`; SUMO runs on its net.
+            method: Estimator, or estimator+controller.
+            model: Model file or name; None for the project's own.
+            settings: Parameters by `component.parameter`, as `acc.headway`.
+            speed_limit: Speed of a host that nobody hinders [m/s]; None for the ramp's limit.
+            host: A vehicle or type that is a host without saying so.
+            attention: Which merging cars a host attends to.
+            rules: How meetings are scored.
+            seed: Seed of the methods' random streams.
+
+        Raises:
+            UserError: There is no such ramp, method or parameter, or SUMO runs with other steps or with lanes inside
+                junctions.
+        """
+        self._api, self._ramp, self._rules = api, Ramp.load(ramp), rules or Rules()
+        self._method = Method.parse(method, settings)
+        if self._method.is_human or self._method.needs_label:
+            raise UserError(f"{method}: it rests on a log and cannot drive in living traffic")
+        self._model = IntentionModel.load(model or default_model(TRAFFIC)) if self._method.needs_model else None
+        self._setting = Setting(speed_limit or self._ramp.speed_limit)
+        if abs(api.simulation.getDeltaT() - DT) > TOLERANCE or api.simulation.getOption("no-internal-links") != "true":
+            raise UserError(f"HostListener: start SUMO with --step-length {DT} --no-internal-links true")
+        self._time = api.simulation.getTime()
+        driver = self._method.driver(self._model)
+        self.controller = HostController(
+            api, self._ramp, driver, self._setting, attention, self._rules.horizon, seed, host
+        )
+
+    def step(self, t: float = 0) -> bool:
+        """Observe, estimate and command; called by `simulationStep()`.
+
+        Raises:
+            UserError: SUMO was asked for several steps at once.
+        """
+        time = self._api.simulation.getTime()
+        if time > self._time + DT + TOLERANCE:
+            raise UserError("HostListener: several steps at once; call simulationStep() without a time")
+        self._time = time
+        self.controller.cycle()
+        return True
+
+    def results(self) -> pd.DataFrame:
+        """End all open meetings and return one row per meeting, as in `results.parquet`; before SUMO is closed."""
+        self.controller.close()
+        names = {"scenario": "", "variation": "", "method": self._method.name}
+        names["model"] = self._model.name if self._model else ""
+        rows = meeting_rows(
+            self.controller.finished, "000", self._ramp, self._rules, self._setting, free_law(self._method), names
+        )
+        return rows.to_pandas()
