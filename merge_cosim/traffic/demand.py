@@ -102,10 +102,8 @@ def _routes(demand: Demand, ramp: Ramp, prefixes: list[str]) -> etree._Element:
         "merging": ("merging", demand.merging, ramp.ramp_route, "first", True),
         "host": ("host", demand.hosts, ramp.main_route, str(ramp.main[0].lane), False),
     }
-    for prefix in prefixes:
-        for name, (kind_of, per_hour, route, lane, even) in flows.items():
-            if not per_hour:
-                continue
+    for name, (kind_of, per_hour, route, lane, even) in flows.items():  # hosts last: SUMO reads flows in time's order
+        for prefix in prefixes if per_hour else ():
             apart = HOUR / per_hour
             flow = {
                 "id": f"{prefix}{name}",

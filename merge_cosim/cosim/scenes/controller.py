@@ -166,29 +166,30 @@ class HostController:
             meeting.stopped |= meeting.merged_at < 0 and merging.speed < STANDING
 
     def _end_meetings(self) -> None:
-        """Take in lane changes, and end what is over."""
+        """Take in lane changes, end what is over, and forget the merging cars that nobody will meet any more."""
         present = self._roster
         for row, meeting in list(self._open.items()):
             host, merging = meeting.host, meeting.merging
             here = host.name in present.hosts and merging.name in present.merging and host.is_on(Part.HOST)
-            if meeting.merged_at >= 0:
-                if not here or not merging.is_on(Part.HOST):
-                    self._end(row, Ending.CENSORED)
-                elif meeting.both_at < 0 and host.x >= meeting.merge_position:
-                    meeting.both_at = len(meeting.states)
-                elif 0 <= meeting.both_at < len(meeting.states) - self._horizon:
-                    self._end(row, Ending.SCORED)
-            elif here and merging.is_on(Part.HOST):
-                if self._next_to_each_other(host, merging):
-                    meeting.merged_at, meeting.merge_position = len(meeting.states), merging.x
-                else:
-                    self._end(row, Ending.NOT_NEXT)
-            elif not here or not merging.is_on(Part.MERGING) or abs(host.x - merging.x) > 2 * self._attention.apart:
-                self._end(row, Ending.NOT_NEXT)
+            if meeting.merged_at < 0:
+                self._await_lane_change(row, meeting, here)
+            elif not here or not merging.is_on(Part.HOST):
+                self._end(row, Ending.CENSORED)
+            if meeting.merged_at >= 0 and meeting.both_at < 0 and host.x >= meeting.merge_position:
+                meeting.both_at = len(meeting.states)
+            elif 0 <= meeting.both_at < len(meeting.states) - self._horizon and row in self._open:
+                self._end(row, Ending.SCORED)
         open_now = {meeting.merging.name for meeting in self._open.values()}
         for name, merging in list(present.merging.items()):
             if not merging.is_on(Part.MERGING) and name not in open_now:
                 present.forget(name)
+
+    def _await_lane_change(self, row: int, meeting: Meeting, here: bool) -> None:
+        host, merging = meeting.host, meeting.merging
+        if here and merging.is_on(Part.HOST) and self._next_to_each_other(host, merging):
+            meeting.merged_at, meeting.merge_position = len(meeting.states), merging.x
+        elif not here or not merging.is_on(Part.MERGING) or abs(host.x - merging.x) > 2 * self._attention.apart:
+            self._end(row, Ending.NOT_NEXT)
 
     def _next_to_each_other(self, host: Actor, merging: Actor) -> bool:
         """No car is between the two, which are in one lane."""
