@@ -41,6 +41,7 @@ class Effort:
         wall_s: Time in the loop [s].
         step_s: Of it, inside SUMO's steps [s].
         method_s: Of it, in estimating and controlling [s].
+        scene_s: Simulated time of scenes [s].
         worst_difference_m: Largest difference of the plant's stations from the closed form, at an encounter's end [m].
     """
 
@@ -49,6 +50,7 @@ class Effort:
     wall_s: float = 0.0
     step_s: float = 0.0
     method_s: float = 0.0
+    scene_s: float = 0.0
     worst_difference_m: float = 0.0
 
     def add(self, other: Effort) -> None:
@@ -58,6 +60,7 @@ class Effort:
         self.wall_s += other.wall_s
         self.step_s += other.step_s
         self.method_s += other.method_s
+        self.scene_s += other.scene_s
         self.worst_difference_m = max(self.worst_difference_m, other.worst_difference_m)
 
 

@@ -257,5 +257,9 @@ def _start(start: Callable[[], object], file: Path, errors: Errors) -> None:
     try:
         start()
     except errors as error:
-        reason = str(error).strip().splitlines()
-        raise UserError(f"{file}: SUMO cannot start: {reason[-1] if reason else 'no reason given'}") from None
+        raise UserError(f"{file}: SUMO cannot start: {one_line(error)}") from None
+
+
+def one_line(error: Exception) -> str:
+    """What SUMO says of an error, in one line."""
+    return " ".join(str(error).split()) or "no reason given"

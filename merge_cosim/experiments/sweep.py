@@ -76,7 +76,8 @@ def sweep(
     ran = perf_counter()
     wants_best = not request.methods or ORACLE_BEST in request.methods
     folder.merge(oracle_best if wants_best else None)
-    _sum_up(tasks, folder, tally, reference_of(method_names(request, tasks), request.against))
+    scenes = folder.scenes()
+    _sum_up(tasks, folder, scenes, tally, reference_of(method_names(request, tasks), request.against))
     effort, run_s = tally.effort, ran - planned
     manifest = {
         **what,
@@ -91,6 +92,7 @@ def sweep(
         "vehicle_steps": effort.vehicle_steps,
         "vehicle_steps_per_s": round(effort.vehicle_steps / run_s) if effort.vehicle_steps else None,
         "ratio_to_bare_sumo": round(effort.wall_s / effort.step_s, 3) if effort.step_s else None,
+        "real_time_factor": round(effort.scene_s / effort.wall_s, 2) if effort.scene_s else None,
         "worst_station_difference_m": effort.worst_difference_m,
     }
     folder.write_json(MANIFEST, manifest)
@@ -115,7 +117,9 @@ def _run(request: SweepRequest, pieces: Sequence[Piece], folder: ResultFolder, p
     return tally
 
 
-def _sum_up(tasks: Sequence[Task], folder: ResultFolder, tally: _Tally, against: str | None) -> None:
+def _sum_up(
+    tasks: Sequence[Task], folder: ResultFolder, scenes: list[dict[str, Any]], tally: _Tally, against: str | None
+) -> None:
     """Write the traces, the summary and the tables beside it, one scenario and variation at a time."""
     single_us, traces = run_alone(tasks, folder)
     folder.write_traces(traces)
@@ -132,7 +136,7 @@ def _sum_up(tasks: Sequence[Task], folder: ResultFolder, tally: _Tally, against:
         parts[BELIEF_CSV].append(belief(rows))
         parts[CALIBRATION_CSV].append(calibration(rows))
     tables = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in parts.items()}
-    tables |= scene_tables(folder.scenes())
+    tables |= scene_tables(scenes)
     for name, table in tables.items():
         (folder.path / name).unlink(missing_ok=True)
         if len(table):

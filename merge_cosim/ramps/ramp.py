@@ -221,9 +221,12 @@ def find_ramp(name_or_folder: str | Path) -> Path:
     Raises:
         UserError: There is neither; the line lists the names.
     """
-    for folder in (shipped("sumo_nets") / name_or_folder, Path(name_or_folder)):
-        if folder.is_dir() and str(name_or_folder):
-            return folder
+    own, ours = Path(name_or_folder), shipped("sumo_nets") / name_or_folder
+    if str(name_or_folder):
+        if (ours / FILE_NAME).is_file():
+            return ours
+        if own.is_dir():
+            return own
     raise UserError(f"no ramp '{name_or_folder}': give one of {', '.join(ramp_names())}, or a folder with {FILE_NAME}")
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.statistics.comparison import reference_of
 from merge_cosim.experiments.statistics.summary import ALL_SITES, GROUP, compare_all
-from merge_cosim.experiments.store import MANIFEST, SUMMARY_JSON, TRACES, ResultFolder
+from merge_cosim.experiments.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, TRACES, ResultFolder
 from merge_cosim.report import case_figures, collisions, measure_tables, set_figures, tables
 from merge_cosim.report.columns import Table
 from merge_cosim.report.export import write_tables
@@ -20,6 +20,7 @@ from merge_cosim.report.html import Picture, render
 from merge_cosim.report.methods import Look, in_order, looks
 from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER, PUBLISHED
 from merge_cosim.report.tables import Section
+from merge_cosim.report.traffic_table import traffic_table
 
 REPORT = "report.html"
 SOURCES = {
@@ -27,8 +28,11 @@ SOURCES = {
     "surrogate": "SYNTHETIC surrogate data, made by SUMO, not real",
     "designed": "designed initial states, no data",
     "random": "random initial states, no data",
+    "traffic": "SUMO's own traffic, no data",
 }
 """What each source is called in headings."""
+NO_SITES = ("designed", "random", "traffic")
+"""Sources whose cases are not from a site's data."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,8 @@ def write_report(folder: Path, against: str | None = None) -> Path:
     """
     store = ResultFolder(folder)
     results = store.results().to_pandas()
+    if not len(results):
+        raise UserError(f"{folder}: nothing to report: no car merged next to a host; see its {NOTES_CSV}")
     manifest = store.read_json(MANIFEST)
     labels = [f"{name}={value}" for name, values in manifest["variations"] for value in values]
     summary = tables.summary_frame(_compared(store.read_json(SUMMARY_JSON), results, against), labels)
@@ -67,12 +73,14 @@ def write_report(folder: Path, against: str | None = None) -> Path:
     varied = {f"{scenario}-{name}": (scenario, name) for scenario, name in tables.varied_parameters(summary)}
     variations = {key: _variation(summary, *pair, drawn) for key, pair in varied.items()}
     contacts = collisions.collision_table(results)
+    traffic = traffic_table(store.traffic())
     exported = {
         f"{c.section.scenario}-{c.section.site}-{c.section.source}-{name}": table
         for c in chapters
         for name, table in c.tables.items()
     }
     exported |= {f"vary-{key}": table for key, (table, _) in variations.items()}
+    exported |= {"traffic": traffic} if traffic else {}
     write_tables(folder, exported | {"collisions": contacts})
     file = folder / REPORT
     page = render(
@@ -81,6 +89,8 @@ def write_report(folder: Path, against: str | None = None) -> Path:
         chapters=chapters,
         variations=variations.values(),
         contacts=contacts,
+        traffic=traffic,
+        told=store.told(),
         explained=collisions.explained(results),
         papers=(PGM_PAPER, FG_GMM_PAPER),
     )
@@ -131,7 +141,7 @@ def _chapter(
     site = "all sites" if section.site == ALL_SITES else section.site
     return Chapter(
         section=section,
-        title=scenario["title"] if section.source in ("designed", "random") else f"{scenario['title']}, {site}",
+        title=scenario["title"] if section.source in NO_SITES else f"{scenario['title']}, {site}",
         source=SOURCES.get(section.source, section.source),
         about=f"Scenario {section.scenario}. {' '.join(scenario['about'].split())}",
         notes=_notes(section, rows, scenario, manifest),
@@ -146,7 +156,7 @@ def _notes(section: Section, rows: pd.DataFrame, scenario: dict[str, Any], manif
     notes += [f"Model {model}: {', '.join(in_order(methods))}." for model, methods in models.items()]
     if section.source == "surrogate":
         notes.append("Every pair is made by SUMO, also where the text above speaks of a log: no real car is in it.")
-    if section.source not in ("designed", "random") and scenario["merging"]["model"] != "replay":
+    if section.source not in NO_SITES and scenario["merging"]["model"] != "replay":
         notes.append(
             f"Only the initial states come from {SOURCES.get(section.source, section.source)}; the merging car drives "
             f"by the model '{scenario['merging']['model']}'."

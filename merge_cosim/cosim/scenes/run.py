@@ -15,7 +15,7 @@ from merge_cosim.cosim.scenes.controller import HostController
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Meeting
 from merge_cosim.cosim.scenes.notes import Event
 from merge_cosim.cosim.scenes.scoring import to_be_scored
-from merge_cosim.cosim.session import SumoOptions, libsumo_started, traci_started
+from merge_cosim.cosim.session import SumoOptions, libsumo_started, one_line, traci_started
 from merge_cosim.errors import UserError
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
@@ -125,7 +125,7 @@ def run_scene(
             if time > scene.warm_up:
                 arrived += simulation.getArrivedNumber()
         controller.close()
-        effort.wall_s = perf_counter() - begin
+        effort.wall_s, effort.scene_s = perf_counter() - begin, time
         facts: dict[str, float] = {
             "simulated_s": time,
             "throughput_veh_h": round(HOUR * arrived / max(time - scene.warm_up, setting.dt), 1),
@@ -167,7 +167,6 @@ def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], a
     try:
         yield api
     except errors as error:
-        reason = str(error).strip().splitlines()
-        raise UserError(f"{scene.file}: SUMO stopped: {reason[-1] if reason else 'no reason given'}") from None
+        raise UserError(f"{scene.file}: SUMO stopped: {one_line(error)}") from None
     finally:
         api.close()

@@ -44,7 +44,7 @@ def test_the_same_motion_has_the_same_measures(method):
     ours = encounters_of(to_be_scored(meetings), "000", "us101", "traffic")
     np.testing.assert_allclose(ours.host_station, encounters.host_station, atol=2e-6)
     scored, others = score(meetings, ours, Rules())
-    assert set(KINDS[int(kind)] for kind in run.columns["kind"]) > {""}
+    assert {KINDS[int(kind)] for kind in run.columns["kind"]} > {""}
     for name, expected in run.columns.items():
         if name != "sumo_collision":
             np.testing.assert_allclose(scored.columns[name], expected, atol=1e-4, err_msg=name)

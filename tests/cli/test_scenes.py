@@ -1,0 +1,215 @@
+"""Living traffic through the real command line."""
+
+import csv
+import json
+import subprocess
+import sys
+import time
+
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from command import merge_cosim
+from scene_files import ROUTES, own_files, small_scene
+
+
+def rows(folder):
+    return pq.read_table(folder / "results.parquet")
+
+
+def table(file):
+    with file.open(newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def swept(tmp_path, *arguments, out="out"):
+    done = merge_cosim("sweep", *arguments, "--out", out, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    return tmp_path / out, done
+
+
+@pytest.fixture(scope="module")
+def minute(tmp_path_factory):
+    """A sweep of three scenes of a minute under two methods."""
+    folder = tmp_path_factory.mktemp("minute")
+    small_scene(folder)
+    out, done = swept(folder, "minute.toml", "--method", "acc", "--method", "always-yield", "--jobs", "2")
+    return folder, out, done
+
+
+def test_meetings_become_rows_and_the_traffic_is_told_as_a_whole(minute):
+    _, out, done = minute
+    found = rows(out).to_pandas()
+    assert set(found["source"]) == {"traffic"}
+    assert found["case"].str.fullmatch(r"00[0-2]/host\.\d+/merging\.\d+").all()
+    assert set(found["method"]) == {"acc", "always-yield"}
+    assert (found["min_leader_gap_m"].dropna() > -5).all()
+    scenes = table(out / "scenes.csv")
+    assert [(one["method"], one["scene"]) for one in scenes] == [
+        (method, f"{scene:03d}") for method in ("acc", "always-yield") for scene in range(3)
+    ]
+    traffic = {one["method"]: one for one in table(out / "traffic.csv")}
+    for method, one in traffic.items():
+        own = found[found["method"] == method]
+        assert int(one["meetings_scored"]) == len(own) > 5
+        assert float(one["throughput_veh_h"]) > 0
+    assert "the traffic as a whole" in done.stdout
+    summary = {row["method"]: row for row in json.loads((out / "summary.json").read_text())}
+    assert summary["acc"]["against"] is None  # in living traffic no two methods have a case in common
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert manifest["real_time_factor"] > 5
+
+
+def test_events_are_told_in_one_line_each_and_listed(minute):
+    _, out, done = minute
+    notes = table(out / "notes.csv")
+    two_hosts = [note for note in notes if note["event"] == "two_hosts"]
+    assert two_hosts
+    assert f"two_hosts: {len(two_hosts)}, such as: merging car" in done.stderr
+    counted = sum(int(one["two_hosts"]) for one in table(out / "scenes.csv"))
+    assert counted == len(two_hosts)
+
+
+def test_the_same_bytes_for_any_number_of_processes(minute):
+    folder, out, _ = minute
+    alone, _ = swept(folder, "minute.toml", "--method", "always-yield", "--method", "acc", "--jobs", "1", out="alone")
+    for name in ("results.parquet", "scenes.csv", "traffic.csv", "notes.csv"):
+        assert (alone / name).read_bytes() == (out / name).read_bytes(), name
+
+
+def test_a_killed_sweep_goes_on_to_the_same_rows(minute):
+    folder, out, _ = minute
+    command = [sys.executable, "-m", "merge_cosim.cli.main", "sweep", "minute.toml", "--method", "acc"]
+    command += ["--method", "always-yield", "--jobs", "1", "--out", "killed"]
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while process.poll() is None and not list((folder / "killed").glob("parts/*.parquet")):
+        time.sleep(0.02)
+    process.kill()
+    process.wait()
+    resumed, _ = swept(folder, "minute.toml", "--method", "acc", "--method", "always-yield", "--resume", out="killed")
+    for name in ("results.parquet", "scenes.csv", "traffic.csv"):
+        assert (resumed / name).read_bytes() == (out / name).read_bytes(), name
+
+
+def test_one_scene_and_one_meeting_alone(minute):
+    folder, out, _ = minute
+    case = next(one for one in rows(out).to_pylist() if one["method"] == "acc")
+    how = ("run", "minute.toml", "--method", "acc", "--json", "--case")
+    alone = json.loads(merge_cosim(*how, case["case"], "--trace", "one.csv", cwd=folder).stdout)
+    assert {name: value for name, value in alone.items() if "log_odds" not in name} == {
+        name: value for name, value in case.items() if "log_odds" not in name
+    }
+    trace = pd.read_csv(folder / "one.csv")
+    assert set(trace["case"]) == {case["case"]}
+    assert trace["leader_gap"].min() == pytest.approx(case["min_leader_gap_m"]) or case["min_leader_gap_m"] is None
+    scene = json.loads(merge_cosim(*how, "001", "--fcd", "f.xml", cwd=folder).stdout)
+    stored = next(one for one in table(out / "scenes.csv") if (one["method"], one["scene"]) == ("acc", "001"))
+    assert {name: str(scene[name]) for name in ("meetings", "throughput_veh_h", "two_hosts")} == {
+        name: stored[name] for name in ("meetings", "throughput_veh_h", "two_hosts")
+    }
+    assert "host.0" in (folder / "f.xml").read_text()
+    for wrong, expected in (("9", "no scene '9'"), ("001/host.0/x", "no meeting '001/host.0/x' is scored under acc")):
+        done = merge_cosim(*how, wrong, cwd=folder)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert expected in done.stderr
+
+
+def test_exported_files_give_the_same_scene(minute):
+    folder, out, _ = minute
+    done = merge_cosim("export", "minute.toml", "--case", "000", "--out", "files", cwd=folder)
+    assert done.stdout.strip().endswith("traffic.sumocfg")
+    own, _ = swept(folder, "files/traffic.sumocfg", "--method", "acc", out="own")
+    expected = [one["distance_m"] for one in rows(out).to_pylist() if one["method"] == "acc" and one["case"] < "001"]
+    assert [one["distance_m"] for one in rows(own).to_pylist()] == expected
+    again = merge_cosim("export", "files/traffic.sumocfg", "--case", "000", "--out", "x", cwd=folder)
+    assert again.returncode == 2
+    assert "is a SUMO configuration already" in again.stderr
+
+
+def test_a_report_of_living_traffic(minute):
+    folder, out, _ = minute
+    done = merge_cosim("report", out, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    page = (out / "report.html").read_text()
+    assert "SUMO&#39;s own traffic" in page or "SUMO's own traffic" in page
+    assert "The traffic as a whole" in page
+    assert (out / "tables" / "traffic.csv").is_file()
+
+
+def test_route_files_of_ones_own_just_run(tmp_path):
+    own_files(tmp_path)
+    out, _ = swept(tmp_path, "my.sumocfg", "--method", "pgm", "--method", "acc")
+    found = rows(out).to_pandas()
+    assert found["case"].str.startswith("000/h.").all()
+    assert found["case"].str.contains("/joining").all()  # no type says merging, so all cars on the on-ramp are
+    assert set(found["method"]) == {"acc", "pgm"}
+
+
+def test_a_host_can_be_named_in_other_peoples_files(tmp_path):
+    own_files(tmp_path, ROUTES.replace('<param key="merge-cosim.role" value="host"/>', ""))
+    done = merge_cosim("sweep", "my.sumocfg", "--method", "acc", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "my.sumocfg: nobody is the host; add <param" in done.stderr
+    out, _ = swept(tmp_path, "my.sumocfg", "--method", "acc", "--set", "encounters.host=host")
+    assert len(rows(out)) > 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('edges="ramp weave', 'edges="rampe weave', "The edge 'rampe' within the route"),
+        ('type="host" route="main"', 'type="host" route="mine"', "The route 'mine' for flow 'h' is not known"),
+        ("</routes>", "", "my.rou.xml: not XML"),
+        ('departSpeed="15"', 'departSpeed="fast"', "my.sumocfg: SUMO cannot start: Invalid departSpeed definition"),
+    ],
+)
+def test_a_mistake_in_a_route_file_is_one_line(tmp_path, old, new, expected):
+    own_files(tmp_path, ROUTES.replace(old, new))
+    done = merge_cosim("sweep", "my.sumocfg", "--method", "acc", cwd=tmp_path)
+    assert done.returncode == 2
+    assert expected in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_a_mistake_that_sumo_meets_on_the_way(tmp_path):
+    late = '<vehicle id="late" type="car" depart="30"><route edges="main_in nowhere"/></vehicle></routes>'
+    own_files(tmp_path, ROUTES.replace("</routes>", late))
+    done = merge_cosim("sweep", "my.sumocfg", "--method", "acc", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "my.sumocfg: SUMO " in done.stderr
+    assert "nowhere" in done.stderr
+
+
+def test_hosts_that_never_depart_are_told(tmp_path):
+    blocked = '<vehicle id="block" type="car" depart="0" departLane="0" departPos="8" departSpeed="0" route="main">'
+    blocked += '<stop lane="main_in_0" endPos="9" duration="1000"/></vehicle><flow id="joining"'
+    own_files(tmp_path, ROUTES.replace('<flow id="joining"', blocked, 1), '<end value="60"/>')
+    out, done = swept(tmp_path, "my.sumocfg", "--method", "acc")
+    assert "hosts_not_departed: 8, such as: host h.0 never departed" in done.stderr
+    assert len(rows(out)) == 0
+    report = merge_cosim("report", out, cwd=tmp_path)
+    assert report.returncode == 2
+    assert "nothing to report: no car merged next to a host" in report.stderr
+
+
+def test_settings_of_scenes(minute):
+    folder, _, _ = minute
+    how = ("sweep", "minute.toml", "--method", "acc", "--set", "encounters.replications=1", "--out", "varied")
+    done = merge_cosim(*how, "--vary", "encounters.demand.car_following=IDM,Krauss", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    traffic = table(folder / "varied" / "traffic.csv")
+    assert [one["variation"] for one in traffic] == [
+        "",
+        "encounters.demand.car_following=IDM",
+        "encounters.demand.car_following=Krauss",
+    ]
+    assert len({one["time_loss_s"] for one in traffic}) == 3
+    for setting, expected in (
+        ("encounters.demand.throug=1", "did you mean 'through'?"),
+        ("encounters.demand.car_following=Krauß", "car_following = 'Krauß'"),
+        ("encounters.demand.hosts=-1", "hosts = -1"),
+        ("merging.model=designed", "merging.model must be 'sumo'"),
+    ):
+        wrong = merge_cosim(*how[:-1], "wrong", "--set", setting, cwd=folder)
+        assert wrong.returncode == 2
+        assert expected in wrong.stderr
