@@ -2,49 +2,19 @@
 
 import json
 import socket
-import subprocess
 
 import pytest
 import sumolib
 from command import merge_cosim
+from running import Running
 
 from merge_cosim.experiments.plan import SweepRequest, plan
-from merge_cosim.ramps.ramp import Ramp
 
-CONDITIONS = {
-    "step-length": "0.1",
-    "no-internal-links": "true",
-    "time-to-teleport": "-1",
-    "collision.action": "warn",
-    "collision.mingap-factor": "0",
-}
 TRAFFIC = """<routes>
 <vehicle id="other" depart="0" departLane="best" departPos="300" departSpeed="max">
 <route edges="main_in weave main_out"/></vehicle>
 </routes>
 """
-
-
-class Running:
-    """A SUMO that listens on a free port, and that ends with the block."""
-
-    def __init__(self, ramp, *further, **conditions):
-        with socket.socket() as free:
-            free.bind(("localhost", 0))
-            self.port = free.getsockname()[1]
-        words = [w for name, value in (CONDITIONS | conditions).items() for w in (f"--{name}", value)]
-        net = ("-n", Ramp.load(ramp).net, "--remote-port", str(self.port))
-        self.command = [sumolib.checkBinary("sumo"), *net, *words, *further]
-
-    def __enter__(self):
-        self.process = subprocess.Popen(self.command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        return f"localhost:{self.port}"
-
-    def __exit__(self, *_):
-        try:
-            assert self.process.wait(30) == 0  # it ends with its last client
-        finally:
-            self.process.kill()
 
 
 def row_of(done):

@@ -2,14 +2,17 @@
 
 import csv
 import json
+import re
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from command import merge_cosim
+from running import Running
 from scene_files import ROUTES, own_files, small_scene
 
 
@@ -190,6 +193,65 @@ def test_hosts_that_never_depart_are_told(tmp_path):
     report = merge_cosim("report", out, cwd=tmp_path)
     assert report.returncode == 2
     assert "nothing to report: no car merged next to a host" in report.stderr
+
+
+@pytest.mark.parametrize("module", ["traci", "libsumo"])
+def test_the_script_of_the_page_finds_the_same_meetings(minute, module):
+    folder, _, _ = minute
+    merge_cosim("export", "minute.toml", "--case", "000", "--out", "files", cwd=folder)
+    own, _ = swept(folder, "files/traffic.sumocfg", "--method", "pgm", "--method", "acc", out=f"own-{module}")
+    page = Path(__file__).parents[2] / "docs" / "traffic.md"
+    (script,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    assert len([line for line in script.splitlines() if line and not line.startswith("#")]) <= 11
+    script = script.replace("import traci  #", f"import {module} as traci  #")
+    script = script.replace("traci.close()", "listener.results().to_parquet('mine.parquet')\ntraci.close()")
+    (folder / "my_script.py").write_text(script)
+    done = subprocess.run(
+        [sys.executable, "my_script.py", "files/traffic.sumocfg"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    mine = pd.read_parquet(folder / "mine.parquet").sort_values("case", ignore_index=True)
+    theirs = rows(own).to_pandas().query("method == 'pgm'").reset_index(drop=True)
+    named = ["scenario", "site"]
+    pd.testing.assert_frame_equal(mine.drop(columns=named), theirs.drop(columns=named))
+    assert mine["case"][0] in done.stdout
+
+
+def test_a_listener_refuses_other_conditions(minute):
+    folder, _, _ = minute
+    script = """
+import libsumo, sys
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.listener import HostListener
+step, several = sys.argv[1:]
+libsumo.start(["sumo", "-c", "files/traffic.sumocfg", "--no-step-log", "true", "--step-length", step])
+try:
+    libsumo.addStepListener(HostListener(libsumo, "us101", "acc"))
+    libsumo.simulationStep(float(several))
+except UserError as error:
+    print(error)
+"""
+    for arguments, expected in (
+        (("0.2", "0"), "start SUMO with --step-length 0.1"),
+        (("0.1", "1"), "several steps at once; call simulationStep() without a time"),
+    ):
+        command = [sys.executable, "-c", script, *arguments]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+        assert expected in done.stdout
+
+
+def test_in_a_sumo_that_runs_already(minute):
+    folder, _, _ = minute
+    with Running("us101", "-r", "files/traffic.rou.xml", "--seed", "0", "--end", "60", cwd=folder) as address:
+        case = ("run", "files/traffic.sumocfg", "--case", "000", "--method", "acc", "--json")
+        attached = json.loads(merge_cosim(*case, "--attach", address, cwd=folder).stdout)
+    own = json.loads(merge_cosim(*case, cwd=folder).stdout)
+    assert attached["meetings"] > 0
+    told = ("mean_speed", "time_loss_s")  # SUMO knows these only where it was asked for trips
+    assert {k: v for k, v in attached.items() if k not in told} == {k: v for k, v in own.items() if k not in told}
 
 
 def test_settings_of_scenes(minute):

@@ -1,0 +1,92 @@
+"""Write the tables of docs/traffic.md: what each method does in living traffic.
+
+    python tools/traffic_page.py [--from DIR]
+
+runs one `merge-cosim sweep` of the three traffic scenarios (about a quarter of an hour on two cores) and sets its
+summary, and its table of the traffic as a whole, between the page's marks.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pandas as pd
+
+from merge_cosim.report.methods import in_order
+
+SCENARIOS = ("traffic-light", "traffic-dense", "traffic-stop-and-go")
+METHODS = ("acc", "slot", "slot-time", "pgm", "pgm-time", "fg-time", "ipcb", "ipcb+acc", "dbn-pf")
+BOUNDS = ("always-go", "always-yield")
+PAGE = Path(__file__).parent.parent / "docs" / "traffic.md"
+BEGIN, END = "<!-- tables: begin -->\n", "<!-- tables: end -->\n"
+
+
+def command(out: str) -> list[str]:
+    """The sweep."""
+    methods = [word for method in (*METHODS, *BOUNDS) for word in ("--method", method)]
+    return ["merge-cosim", "sweep", *SCENARIOS, *methods, "--out", out]
+
+
+def main() -> None:
+    """Run the sweep, if need be, and write the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--from", dest="folder", type=Path, help="result folder of the sweep, if it was run already")
+    folder = parser.parse_args().folder
+    if folder is None:
+        folder = Path(tempfile.mkdtemp(prefix="traffic-")) / "out"
+        subprocess.run([sys.executable, "-m", "merge_cosim.cli.main", *command(str(folder))[1:]], check=True)
+    summary = pd.read_json(folder / "summary.json")
+    traffic = pd.read_csv(folder / "traffic.csv")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    parts = ["```", " ".join(command("OUT")).replace(" --method", " \\\n    --method", 1), "```", ""]
+    parts.append(
+        f"{int(traffic['scenes'].sum())} scenes, {manifest['real_time_factor']:.0f} times real time in each of "
+        f"{manifest['command']['jobs']} processes."
+    )
+    for scenario in SCENARIOS:
+        parts += ["", f"### {scenario}", ""]
+        parts += table(summary[summary["scenario"] == scenario], traffic[traffic["scenario"] == scenario])
+    text = PAGE.read_text(encoding="utf-8")
+    head, _, rest = text.partition(BEGIN)
+    _, _, tail = rest.partition(END)
+    PAGE.write_text(head + BEGIN + "\n".join(parts) + "\n" + END + tail, encoding="utf-8")
+
+
+def table(summary: pd.DataFrame, traffic: pd.DataFrame) -> list[str]:
+    """One row per method: its meetings, and the traffic as a whole."""
+    lines = [
+        "| method | failures of n (Wilson 95 %) | censored | D m | delay s | braking m/s² | leader gap m "
+        "| follower gap m | merging car stopped | contacts of hosts | cars out per h | time lost s |",
+        "|---" * 12 + "|",
+    ]
+    rows, whole = summary.set_index("method"), traffic.set_index("method")
+    for method in in_order(summary["method"]):
+        one, all_cars = rows.loc[method], whole.loc[method]
+        failures = f"{one['failures']} of {one['n']} ({one['ci_low_pct']:.1f}–{one['ci_high_pct']:.1f} %)"
+        cells = [
+            method,
+            failures,
+            str(one["censored"]),
+            *(f"{one[name]:.{digits}f}" for name, digits in MEASURES),
+            f"{all_cars['merging_stopped']:.0f} of {all_cars['meetings']:.0f}",
+            f"{all_cars['host_contacts']:.0f}",
+            f"{all_cars['throughput_veh_h']:.0f}",
+            f"{all_cars['time_loss_s']:.2f}",
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+MEASURES = (
+    ("distance_m", 1),
+    ("delay_s", 2),
+    ("hardest_braking", 2),
+    ("min_leader_gap_m_p05", 1),
+    ("min_follower_gap_m_p05", 1),
+)
+
+if __name__ == "__main__":
+    main()
