@@ -1,0 +1,40 @@
+"""How fast living traffic runs: about two thousand cars on copies of a ramp, the hosts driven by a method."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from merge_cosim.experiments.plan import SweepRequest, plan
+from merge_cosim.experiments.scenes import SceneBatch
+
+SCENARIO, METHOD = "traffic-dense", "pgm"
+MODELS = ("Krauss", "IDM", "EIDM")
+SETTINGS = {
+    "encounters.replications": 1,
+    "encounters.demand.copies": 16,
+    "encounters.demand.duration": 180.0,
+    "encounters.demand.warm_up": 30.0,
+}
+
+
+def scene_costs() -> list[dict[str, Any]]:
+    """A row per car-following model: cars on average, real-time factor of the whole loop, share of SUMO's steps."""
+    return [_cost(model) for model in MODELS]
+
+
+def _cost(model: str) -> dict[str, Any]:
+    settings = SETTINGS | {"encounters.demand.car_following": model}
+    (task,) = plan(SweepRequest([SCENARIO], [METHOD], settings=settings))
+    assert isinstance(task, SceneBatch)
+    with task.scene(0) as scene:
+        run = task.simulate(scene)
+    effort, facts = run.effort, run.facts
+    return {
+        "model": model,
+        "cars": round(effort.vehicle_steps / (facts["simulated_s"] / task.setting(scene.ramp).dt)),
+        "hosts": facts["hosts"],
+        "meetings": facts["meetings"],
+        "real_time_factor": round(facts["simulated_s"] / effort.wall_s, 1),
+        "us_per_vehicle_step": round(1e6 * effort.wall_s / effort.vehicle_steps, 3),
+        "ratio_to_bare_sumo": round(effort.wall_s / effort.step_s, 3),
+    }
