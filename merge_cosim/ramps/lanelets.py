@@ -14,7 +14,7 @@ import numpy as np
 import sumolib
 
 from merge_cosim.ramps import polyline
-from merge_cosim.ramps.ramp import Ramp, Section, read_net
+from merge_cosim.ramps.ramp import Ramp, read_net
 from merge_cosim.units import FloatArray
 
 DRIVER = "passenger"
@@ -102,16 +102,6 @@ def lanelets(ramp: Ramp) -> dict[str, Lanelet]:
     return found
 
 
-def along(road: Mapping[str, Lanelet], sections: Sequence[Section], x: FloatArray) -> FloatArray:
-    """Points at x [m past the gore], shape (n,), in the lanes of a path's sections; shape (n, 2)."""
-    which = np.maximum(np.searchsorted([section.start for section in sections], x, side="right") - 1, 0)
-    points = np.empty((len(x), 2))
-    for number, section in enumerate(sections):
-        rows = which == number
-        points[rows] = road[f"{section.edge}_{section.lane}"].at(x[rows] - section.start)
-    return points
-
-
 def _edges(net: sumolib.net.Net, ramp: Ramp) -> list[sumolib.net.edge.Edge]:
     paths = [[net.getEdge(section.edge) for section in path] for path in (ramp.main, ramp.ramp)]
     found = {edge.getID(): edge for path in paths for edge in path}
@@ -139,9 +129,7 @@ def _boundaries(row: Sequence[sumolib.net.lane.Lane]) -> list[FloatArray]:
     for share in shares[1:]:
         if share - kept[-1] >= spacing and 1.0 - share >= spacing:
             kept.append(float(share))
-    middles = [
-        _between(shape, way / way[-1], np.array([*kept, 1.0])) for shape, way in zip(shapes, ways, strict=True)
-    ]
+    middles = [_between(shape, way / way[-1], np.array([*kept, 1.0])) for shape, way in zip(shapes, ways, strict=True)]
     half = [0.5 * float(lane.getWidth()) for lane in row]
     right = [polyline.beside(middle, -width) for middle, width in zip(middles, half, strict=True)]
     return [*right, polyline.beside(middles[-1], half[-1])]
@@ -150,7 +138,7 @@ def _boundaries(row: Sequence[sumolib.net.lane.Lane]) -> list[FloatArray]:
 def _links(
     lanes: Mapping[str, list[sumolib.net.lane.Lane]],
 ) -> Iterator[tuple[sumolib.net.lane.Lane, sumolib.net.lane.Lane]]:
-    """Connections that lead straight on; one that also leads sideways, past a straighter one at each end, is left out."""
+    """Connections that lead straight on; one is left out where a straighter one begins and another ends with it."""
     every = [
         (lane, link.getToLane(), _sideways(lane, link.getToLane()))
         for row in lanes.values()
@@ -161,7 +149,7 @@ def _links(
     for before, after, offset in every:
         from_here = min(other for lane, _, other in every if lane is before)
         to_there = min(other for _, lane, other in every if lane is after)
-        if offset in (from_here, to_there):
+        if offset <= from_here or offset <= to_there:
             yield before, after
 
 
