@@ -172,7 +172,10 @@ def export(
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us."""
+    """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us.
+
+    With --commonroad: run the case and write it as a CommonRoad scenario, with the host as its planning problem.
+    """
     from merge_cosim.experiments.methods import parse_setting
     from merge_cosim.experiments.plan import SweepRequest
     from merge_cosim.experiments.single import export_case, export_commonroad

@@ -21,8 +21,8 @@ def poses(
 ) -> tuple[FloatArray, FloatArray]:
     """Where a car is that drives in the middle of its lanelets.
 
-    The merging car moves sideways over `SIDEWAYS` metres before and after the merging point, so that its front is
-    halfway between the lanes where the run changes lane.
+    The merging car moves sideways over `SIDEWAYS` metres before and after the merging point, as far as the auxiliary
+    lane reaches, so that its front is halfway between the lanes where the run changes lane.
 
     Args:
         road: The ramp's lanelets by SUMO lane id.
@@ -35,7 +35,8 @@ def poses(
     Returns:
         The car's centres [m], shape (n, 2), and its headings [rad], shape (n,).
     """
-    reach = max(min(SIDEWAYS, merge_position, ramp.auxiliary_end - merge_position), HEADING_STEP)
+    before = min(SIDEWAYS, merge_position)
+    after = min(SIDEWAYS, ramp.auxiliary_end - merge_position)
     onward = tuple(section for section in ramp.main if section.start >= 0.0)
 
     def points(front: FloatArray) -> FloatArray:
@@ -44,7 +45,7 @@ def poses(
             return _along(road, ramp.main, x)
         if not ramp.changes_lane:
             return _along(road, (*ramp.ramp, *onward), x)
-        share = np.clip((front + reach) / (2.0 * reach), 0.0, 1.0)[:, None]
+        share = np.clip((front + before) / (before + after), 0.0, 1.0)[:, None]
         share = share**2 * (3.0 - 2.0 * share)
         return np.asarray((1.0 - share) * _along(road, ramp.ramp, x) + share * _along(road, ramp.main, x))
 
