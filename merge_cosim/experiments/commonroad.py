@@ -205,7 +205,7 @@ def _host(
             area = road[f"{section.edge}_{section.lane}"].area_from(max(merge_position - section.start, 0.0))
             place = PolygonOccupancy(shapely.Polygon(area))
             goals.append(CustomState(time_step=Interval(0, len(record) - 1), position=place))
-    start = _states("host", road, ramp, encounters, record)[0]
+    start = _states("host", road, ramp, encounters, record)[0] | {"acceleration": 0.0}  # the method's is no part of it
     return PlanningProblem(number, _initial(start), GoalRegion(goals))
 
 

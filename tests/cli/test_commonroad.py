@@ -141,6 +141,7 @@ def test_sumo_has_the_car_in_the_same_place(exported):
 def test_the_host_starts_short_of_the_goal_and_ends_in_it(exported):
     start, first, last = exported.problem.initial_state, exported.trace[0], exported.trace[-1]
     assert start.velocity == pytest.approx(first["host_speed_m_s"], abs=ROUNDING)
+    assert start.acceleration == 0.0
     road, at = lanelets(exported.ramp), exported.merge_position
     length = 5.0  # of no account: the goal is reached metres before the record ends
     stations = np.array([first["host_station_m"], last["host_station_m"]])
