@@ -161,22 +161,40 @@ def export(
     scenario: Annotated[str, typer.Argument(help="Shipped scenario or scenario file.")],
     case: Annotated[str, typer.Option(help="Case, as in the column 'case' of results.parquet.")],
     out: Annotated[Path, typer.Option(help="Folder to write to.")],
+    commonroad: Annotated[bool, typer.Option("--commonroad", help="Write a CommonRoad scenario instead.")] = False,
+    method: Annotated[
+        str | None, typer.Option(help="With --commonroad: the method that drives the host (acc, if not given).")
+    ] = None,
+    model: Model = None,
     set_: Sets = None,
     data: Data = None,
     source: ForceSource = None,
+    seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us."""
+    """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us.
+
+    With --commonroad: run the case and write it as a CommonRoad scenario, with the host as its planning problem.
+    """
     from merge_cosim.experiments.methods import parse_setting
     from merge_cosim.experiments.plan import SweepRequest
-    from merge_cosim.experiments.single import export_case
+    from merge_cosim.experiments.single import export_case, export_commonroad
     from merge_cosim.ngsim.data import find_data
 
-    settings = dict(map(parse_setting, set_ or ()))
-    request = SweepRequest([scenario], ["acc"], settings=settings, data=find_data(data), source=source)
-    file = export_case(request, case, out)
+    if method and not commonroad:
+        raise UserError("--method: only with --commonroad; the SUMO files of a case are the same under all methods")
+    request = SweepRequest(
+        scenarios=[scenario],
+        methods=[method or "acc"],
+        model=model,
+        settings=dict(map(parse_setting, set_ or ())),
+        data=find_data(data),
+        source=source,
+        seed=seed,
+    )
+    file = export_commonroad(request, case, out) if commonroad else export_case(request, case, out)
     if json:
-        print_json({"sumocfg": str(file)})
+        print_json({"commonroad" if commonroad else "sumocfg": str(file)})
     else:
         typer.echo(file)
 

@@ -131,6 +131,27 @@ def export_case(request: SweepRequest, case: str, out: Path) -> Path:
     return write_encounter(out, Ramp.load(batch.scenario.ramp), batch.encounters, 0)
 
 
+def export_commonroad(request: SweepRequest, case: str, out: Path) -> Path:
+    """Run one case of one scenario under one method and write it as a CommonRoad scenario; returns the file.
+
+    Raises:
+        UserError: There is no such case, the scenario's cases are scenes, or commonroad-io is not installed.
+    """
+    from merge_cosim.experiments.commonroad import need_library, write_commonroad
+
+    need_library()
+    if isinstance(task := plan(request)[0], SceneBatch):
+        raise UserError(f"scenario {task.scenario.name}: --commonroad writes encounters of two cars, not scenes")
+    every = plan_encounters(request)
+    batch = _case_alone(every, case)
+    number = 1 + int(np.flatnonzero(every[0].encounters.case == case)[0])
+    ramp = Ramp.load(batch.scenario.ramp)
+    _, record = trace_case(batch)
+    source = batch.encounters.source[0]
+    story = f"scenario {batch.scenario.name} (source {source}), case {case}, host driven by {batch.method.name}"
+    return write_commonroad(out, ramp, batch.encounters, record, number, story)
+
+
 def _need_display() -> None:
     if "DISPLAY" not in os.environ and sys.platform.startswith("linux"):
         raise UserError("--gui: there is no display (DISPLAY is not set); leave it out, or use xvfb-run")

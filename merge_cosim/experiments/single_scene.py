@@ -68,12 +68,12 @@ def export_scene(batch: SceneBatch, out: Path) -> Path:
 
 
 def _record(run: SceneRun, scene: str) -> pd.DataFrame:
-    """One row per meeting and cycle."""
+    """One row per meeting and cycle; its time is the one that SUMO's own files give to the same state."""
     parts = [pd.DataFrame(columns=["case", "time_s", *RECORDED])]
     for meeting in run.meetings:
         if meeting.states:
             part = pd.DataFrame(np.array(meeting.states), columns=list(RECORDED))
-            part.insert(0, "time_s", ((meeting.begin + 1 + np.arange(len(part))) * DT).round(9))
+            part.insert(0, "time_s", ((meeting.begin + np.arange(len(part))) * DT).round(9))
             part.insert(0, "case", f"{scene}/{meeting.host.name}/{meeting.merging.name}")
             parts.append(part)
     return pd.concat(parts, ignore_index=True)

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -107,6 +109,94 @@ def test_fcd_is_the_trace_on_the_designed_ramp_and_sumos_tool_draws_it(tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "td.png").read_bytes().startswith(b"\x89PNG")
     assert "t0.merging" in (tmp_path / "td.txt").read_text()
+
+
+SCENE = """
+title = "A minute and a half of traffic"
+ramp = "us101"
+
+[encounters]
+kind = "traffic"
+replications = 1
+
+[encounters.demand]
+duration = 90
+warm_up = 10
+through = 3000
+merging = 600
+hosts = 360
+
+[merging]
+model = "sumo"
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A short scene with all outputs: its folder, facts, and the meetings' record."""
+    folder = tmp_path_factory.mktemp("scene")
+    (folder / "short.toml").write_text(SCENE)
+    files = [word for name in OUTPUTS for word in (f"--{name}", f"scene/{name}.xml")]
+    arguments = ("short.toml", "--case", "000", "--method", "pgm", "--trace", "trace.csv", *files, "--json")
+    done = merge_cosim("run", *arguments, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    with (folder / "trace.csv").open(newline="") as file:
+        return folder, json.loads(done.stdout), list(csv.DictReader(file))
+
+
+def test_fcd_of_a_scene_has_all_cars_and_the_record_of_its_meetings(scene):
+    folder, facts, record = scene
+    ramp, seen, cars = Ramp.load("us101"), {}, set()
+    for step in sumolib.xml.parse(str(folder / "scene/fcd.xml"), "timestep"):
+        for car in step.vehicle or ():
+            edge, _, lane = car.lane.rpartition("_")
+            cars.add(car.id)
+            if car.id.startswith(("host", "merging")):
+                place = ramp.station(edge, int(lane), float(car.pos), 0.0)
+                seen[float(step.time), car.id] = (place, float(car.speed))
+    assert len(cars) == facts["vehicles"]
+    assert len(record) > 50
+    for row in record:
+        _, *names = row["case"].split("/")
+        for role, name in zip(("host", "merging"), names, strict=True):
+            recorded = (float(row[f"{role}_x"]), float(row[f"{role}_speed"]))
+            assert seen[float(row["time_s"]), name] == pytest.approx(recorded, abs=ROUNDING)
+
+
+def test_other_outputs_of_a_scene_agree_with_its_facts(scene):
+    folder, facts, _ = scene
+    trips = list(sumolib.xml.parse(str(folder / "scene/tripinfo.xml"), "tripinfo"))
+    assert len(trips) == facts["vehicles"]
+    arrived = [float(trip.timeLoss) for trip in trips if float(trip.arrival) >= 0.0]
+    assert sum(arrived) / len(arrived) == pytest.approx(facts["time_loss_s"], abs=0.01)
+    changes = list(sumolib.xml.parse(str(folder / "scene/lanechange.xml"), "change"))
+    merged = {change.id for change in changes if (change.attr_from, change.to) == ("weave_0", "weave_1")}
+    assert any(name.startswith("merging") for name in merged)
+    contacts = list(sumolib.xml.parse(str(folder / "scene/collisions.xml"), "collision"))
+    assert len(contacts) == facts["host_contacts"] + facts["other_contacts"]
+    egos = {entry.ego for entry in sumolib.xml.parse(str(folder / "scene/ssm.xml"), "globalMeasures")}
+    assert egos >= {trip.id for trip in trips if trip.id.startswith("host") and float(trip.arrival) >= 0.0}
+
+
+def test_sumos_tools_draw_a_scene(scene):
+    """The commands of docs/sumo-tools.md, on the cars of the scene's first meeting."""
+    folder, _, record = scene
+    page = (Path(__file__).parents[2] / "docs/sumo-tools.md").read_text().replace("\\\n", " ")
+    commands = [
+        shlex.split(line) for line in page.splitlines() if line.startswith("python $TOOLS") and " scene/" in line
+    ]
+    assert len(commands) == 5
+    pair = ",".join(record[0]["case"].split("/")[1:])
+    environment = os.environ | {"SUMO_HOME": sumo.SUMO_HOME}
+    for _, tool, *words in commands:
+        script = tool.replace("$TOOLS", f"{sumo.SUMO_HOME}/tools")
+        words = [pair if word == "host.2,merging.8" else word for word in words]
+        command = [sys.executable, script, *words]
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        if "-o" in words:
+            assert (folder / words[words.index("-o") + 1]).read_bytes().startswith(b"\x89PNG")
+    assert (folder / "scene/lanechange.csv").stat().st_size > 0
 
 
 def test_contacts_are_reported(tmp_path, data_dir):
