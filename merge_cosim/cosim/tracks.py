@@ -1,0 +1,105 @@
+"""What every encounter of a batch goes through, cycle by cycle: recorded while it runs, laid end to end when it is over."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from merge_cosim.encounter import Encounters
+from merge_cosim.observation import Observation
+from merge_cosim.units import FloatArray, IntArray
+
+DECIMALS = 6
+"""What is observed is rounded to 1e-6 m and m/s: the designed grid is full of ties that the last bits would break."""
+
+
+class Recorder:
+    """Keeps the last cycles of all encounters of a batch, as many as the longest encounter has.
+
+    Attributes:
+        state: The present cycle, rounded, shape (4, count), in the order of `Plant.state`; not to be written to.
+    """
+
+    def __init__(self, count: int, longest: int) -> None:
+        """Make room for `count` encounters of at most `longest` cycles."""
+        self._cycles = np.zeros((longest + 1, 5, count))
+        self._shown = self._cycles.view()
+        self._shown.flags.writeable = False
+        self._now = 0
+
+    @property
+    def state(self) -> FloatArray:
+        return self._shown[self._now, :4]
+
+    def believed(self, log_odds: FloatArray) -> None:
+        """Keep the beliefs of the present cycle, shape (count,)."""
+        self._cycles[self._now, 4] = log_odds
+
+    def moved(self, state: FloatArray) -> None:
+        """Go on to the next cycle, with the plant's state."""
+        self._now = (self._now + 1) % len(self._cycles)
+        state.round(DECIMALS, out=self._cycles[self._now, :4])
+
+    def placed(self, rows: IntArray, state: FloatArray) -> None:
+        """Let new encounters begin at `rows` in the present cycle; of the old ones there the last state is lost."""
+        self._cycles[self._now, :4, rows] = state[:, rows].round(DECIMALS).T
+
+    def track(self, row: int, cycles: int) -> FloatArray:
+        """The states and beliefs of the last `cycles` cycles at a row, and the present one; shape (cycles + 1, 5)."""
+        first = self._now - cycles
+        if first >= 0:
+            return self._cycles[first : self._now + 1, :, row].copy()
+        return np.concatenate([self._cycles[first:, :, row], self._cycles[: self._now + 1, :, row]])
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Finished encounters from the first state to the last, laid end to end: m encounters, N states.
+
+    Attributes:
+        states: All states, shape (N,) each.
+        log_odds: The belief in each state; an encounter's last state has none, and what stands there means nothing.
+        case: Index of each encounter's case, shape (m,).
+        cycles: Number of cycles of each encounter, at least 1, one less than it has states; shape (m,).
+    """
+
+    states: Observation
+    log_odds: FloatArray
+    case: IntArray
+    cycles: IntArray
+
+    @classmethod
+    def of(cls, encounters: Encounters, cases: Sequence[int], tracks: Sequence[FloatArray]) -> Tracks:
+        """Lay the recorded `tracks` of `cases` end to end."""
+        case, sizes = np.array(cases), np.array([len(track) for track in tracks])
+        host_station, merging_station, host_speed, merging_speed, log_odds = np.concatenate(tracks).T.copy()
+        lengths = (np.repeat(of_car[case], sizes) for of_car in (encounters.host_length, encounters.merging_length))
+        states = Observation(host_station, host_speed, merging_station, merging_speed, *lengths)
+        return cls(states, log_odds, case, sizes - 1)
+
+    @cached_property
+    def last(self) -> IntArray:
+        """Where each encounter's last state is, shape (m,)."""
+        return np.cumsum(self.cycles + 1) - 1
+
+    @cached_property
+    def first(self) -> IntArray:
+        """Where each encounter's first state is, shape (m,)."""
+        return self.last - self.cycles
+
+    @cached_property
+    def encounter(self) -> IntArray:
+        """Which of the m encounters each state belongs to, shape (N,)."""
+        return np.repeat(np.arange(len(self.cycles)), self.cycles + 1)
+
+    @cached_property
+    def age(self) -> IntArray:
+        """The cycle of each state, counted from its encounter's start, shape (N,)."""
+        return np.arange(len(self.log_odds)) - self.first[self.encounter]
+
+    def fill(self, value: float) -> FloatArray:
+        """A measure with the same value for every encounter, shape (m,)."""
+        return np.full(len(self.cycles), value)
