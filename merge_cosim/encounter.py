@@ -144,10 +144,11 @@ class Encounters:
     def __len__(self) -> int:
         return len(self.case)
 
-    def initial_state(self, rows: IntArray) -> FloatArray:
-        """Stations of the host and the merging car, then their speeds, shape (4, len(rows)) [m, m/s]."""
-        columns = (self.host_station, self.merging_station, self.host_speed, self.merging_speed)
-        return np.array([column[rows] for column in columns])
+    @cached_property
+    def start(self) -> FloatArray:
+        """Stations of host and merging car, then their speeds, then their lengths, shape (6, n) [m, m/s, m]."""
+        states = (self.host_station, self.merging_station, self.host_speed, self.merging_speed)
+        return np.array([*states, self.host_length, self.merging_length])
 
     def take(self, rows: IntArray) -> Encounters:
         """Return the chosen encounters, in that order."""

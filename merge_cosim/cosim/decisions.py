@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from merge_cosim.cosim.tracks import Tracks
-from merge_cosim.units import TOLERANCE, FloatArray
+from merge_cosim.units import TOLERANCE, FloatArray, time_to_arrival
 
 GATES = (110, 70, 40, 20)
 """Distances of the merging car to the merging point [m] at which beliefs are kept, from far to near."""
@@ -19,9 +19,8 @@ def decisions(tracks: Tracks) -> dict[str, FloatArray]:
     started nearer or a car was through.
     """
     states, age = tracks.states, tracks.age
-    acting = np.ones(len(age), dtype=bool)
-    acting[tracks.last] = False
-    still_open = acting & (np.maximum(states.host_station, states.merging_station) < -TOLERANCE)
+    still_open = np.maximum(states.host_station, states.merging_station) < -TOLERANCE
+    still_open[tracks.last] = False  # nothing is decided there any more
     at = np.flatnonzero(still_open)
     whose, not_yield = tracks.encounter[at], tracks.log_odds[at] >= 0.0
     flips = np.zeros(len(at), dtype=bool)
@@ -33,15 +32,14 @@ def decisions(tracks: Tracks) -> dict[str, FloatArray]:
     kept = {"decision_flips": decision_flips, "last_decision": last_decision, "decided_from": decided_from}
     start = states.merging_station[tracks.first]
     for gate in GATES:
-        at = np.flatnonzero(acting & (states.merging_station >= -gate - TOLERANCE))[::-1]
-        first = np.full(len(start), -1)
-        first[tracks.encounter[at]] = at
-        found = (first >= 0) & (start <= -gate + TOLERANCE)
-        found[found] = still_open[first[found]]
-        at = first[found]
+        reached = tracks.count(states.merging_station < -gate - TOLERANCE)
+        met = np.flatnonzero((reached < tracks.cycles) & (start <= -gate + TOLERANCE))
+        at = tracks.first[met] + reached[met]
+        met, at = met[still_open[at]], at[still_open[at]]
         log_odds, lead = tracks.fill(np.nan), tracks.fill(np.nan)
-        log_odds[found] = tracks.log_odds[at]
-        lead[found] = (states.host_arrival - states.merging_arrival)[at]
+        log_odds[met] = tracks.log_odds[at]
+        lead[met] = time_to_arrival(states.host_station[at], states.host_speed[at])
+        lead[met] -= time_to_arrival(states.merging_station[at], states.merging_speed[at])
         lead[np.isnan(log_odds)] = np.nan
         kept |= {f"log_odds_{gate}": log_odds, f"arrival_lead_{gate}": lead}
     return kept

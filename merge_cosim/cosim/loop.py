@@ -10,7 +10,7 @@ from time import perf_counter
 import numpy as np
 
 from merge_cosim.control.base import Controller
-from merge_cosim.cosim.plant import NumpyPlant, Plant
+from merge_cosim.cosim.plant import Plant
 from merge_cosim.cosim.scoring import Ending, Rules, score
 from merge_cosim.cosim.tracks import Recorder, Tracks
 from merge_cosim.encounter import NEVER, Encounters
@@ -18,7 +18,7 @@ from merge_cosim.intention.base import Estimator
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.streams import stream_keys
 from merge_cosim.traffic.base import MergingCar
-from merge_cosim.units import AnyArray, BoolArray, FloatArray, IntArray
+from merge_cosim.units import DT, AnyArray, BoolArray, FloatArray, IntArray
 
 SCORED_TOGETHER = 128
 """Encounters that are over wait until so many can be scored in one go; their tracks then still fit the cache."""
@@ -122,7 +122,7 @@ class _Loop:
         self.rules, self.setting, self.traced = rules, setting, traced
         self.recorder = Recorder(count, rules.time_out_cycles)
         self.ending = Ending(count, rules)
-        self.shadow = NumpyPlant(count)
+        self.closed_form = np.zeros((2, count))
         self.effort = Effort()
         self.traces: dict[int, dict[str, list[float]]] = {case: defaultdict(list) for case in traced}
         driver.estimator.start(count, setting)
@@ -132,8 +132,7 @@ class _Loop:
         self.case = np.full(count, -1)
         self.age = np.zeros(count, dtype=np.int64)
         self.score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
-        self.speeds = np.zeros((2, count))
-        self.host_length, self.merging_length = np.ones(count), np.ones(count)
+        self.speeds, self.lengths = np.zeros((2, count)), np.ones((2, count))
         self.next_case = 0
         self.over: dict[int, FloatArray] = {}
         self.columns: dict[str, AnyArray] = {"sumo_collision": np.zeros(n, dtype=bool)}
@@ -165,7 +164,7 @@ class _Loop:
         if self.traced:
             self._trace(now, log_odds, not_yield, self.speeds[0])
         self.plant.advance(self.speeds)
-        self.shadow.advance(self.speeds)
+        self.closed_form += self.speeds * DT
         self.recorder.moved(self.plant.state)
         self.age += 1
         self.effort.method_s += decided - begin
@@ -179,7 +178,7 @@ class _Loop:
 
     def _observe(self) -> Observation:
         host_station, station, host_speed, speed = self.recorder.state
-        return Observation(host_station, host_speed, station, speed, self.host_length, self.merging_length)
+        return Observation(host_station, host_speed, station, speed, *self.lengths)
 
     def _refill(self, rows: IntArray) -> None:
         cases = np.arange(self.next_case, min(self.next_case + len(rows), len(self.encounters)))
@@ -190,11 +189,11 @@ class _Loop:
         self.active = self.case >= 0
         if not len(rows):
             return
-        self.host_length[rows] = self.encounters.host_length[cases]
-        self.merging_length[rows] = self.encounters.merging_length[cases]
-        for plant in (self.plant, self.shadow):
-            plant.place(rows, self.encounters, cases)
-        self.recorder.placed(rows, self.plant.state)
+        self.plant.place(rows, self.encounters, cases)
+        start = self.encounters.start[:, cases]
+        self.lengths[:, rows] = start[4:]
+        self.closed_form[:, rows] = start[:2]
+        self.recorder.placed(rows, start[:4])
         self.merging_car.reset(rows, cases)
         self.driver.estimator.reset(rows, self.encounters.label[cases], self.keys[cases])
         self.driver.controller.reset(rows)
@@ -202,8 +201,8 @@ class _Loop:
 
     def _finish(self, rows: IntArray) -> None:
         cases = self.case[rows]
-        apart = np.abs(self.plant.state[:2, rows] - self.shadow.state[:2, rows])
-        self.effort.worst_difference_m = max(self.effort.worst_difference_m, float(apart.max()))  # it does not heal
+        apart = np.abs(self.plant.state[:2, rows] - self.closed_form[:, rows]).max()  # what came between them stays
+        self.effort.worst_difference_m = max(self.effort.worst_difference_m, float(apart))
         self.columns["sumo_collision"][cases] = self.plant.collided[rows]
         for case, row, cycles in zip(cases.tolist(), rows.tolist(), self.age[rows].tolist(), strict=True):
             self.over[case] = self.recorder.track(row, cycles)

@@ -10,7 +10,7 @@ import numpy as np
 
 from merge_cosim.cosim.session import Car, LibsumoSession, Session, SumoOptions
 from merge_cosim.encounter import Encounters
-from merge_cosim.ramps.ramp import Ramp, Way
+from merge_cosim.ramps.ramp import LanePosition, Ramp, Way
 from merge_cosim.ramps.tiles import tile_id, tile_net
 from merge_cosim.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
 
@@ -51,7 +51,7 @@ class NumpyPlant:
 
     def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
         """See `Plant`."""
-        self.state[:, tiles] = encounters.initial_state(cases)
+        self.state[:, tiles] = encounters.start[:4, cases]
 
     def advance(self, speeds: FloatArray) -> None:
         """See `Plant`."""
@@ -100,10 +100,11 @@ class SumoPlant:
             for name, row in self._row.items()
         )
         start = {section.edge: section.start for section in ramp.main + ramp.ramp}
-        self._edge_start = np.array([start[edge] for route in routes for edge in route])
+        self._starts = np.array([start[edge] for route in routes for edge in route])
         self._edge_number = [{edge: i for i, edge in enumerate(routes[0])}]
         self._edge_number += [{edge: i + len(routes[0]) for i, edge in enumerate(routes[1])}]
         self._edge = np.repeat([0, len(routes[0])], count)
+        self._edge_start = self._starts[self._edge]
         self._position = np.zeros(2 * count)
         self._merge_position = np.zeros(2 * count)
         self._length = np.full(2 * count, np.nan)
@@ -113,31 +114,27 @@ class SumoPlant:
 
     def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
         """See `Plant`."""
-        state = encounters.initial_state(cases)
-        self.state[:, tiles] = state
+        start = encounters.start[:, cases]
+        self.state[:, tiles] = start[:4]
         self.collided[tiles] = False
         self._in_host_lane[tiles] = not self.ramp.changes_lane
         merge_position = encounters.merge_position[cases]
-        paths: tuple[tuple[Way, IntArray, FloatArray], ...] = (
-            ("main", tiles, encounters.host_length),
-            ("ramp", tiles + self.count, encounters.merging_length),
-        )
-        for (path, rows, length), station, speed in zip(paths, state[:2], state[2:], strict=True):
-            self._place(path, rows, merge_position, station, speed, length[cases])
+        paths: tuple[tuple[Way, IntArray], ...] = (("main", tiles), ("ramp", tiles + self.count))
+        for car, (path, rows) in enumerate(paths):
+            self._merge_position[rows] = merge_position
+            values = zip(rows.tolist(), merge_position.tolist(), *start[car::2].tolist(), strict=True)
+            for row, position, station, speed, length in values:
+                self._place(row, self.ramp.place(path, station, position), speed, length)
 
-    def _place(self, path: Way, rows: IntArray, *columns: FloatArray) -> None:
-        """Put cars on a path; the columns are merging position, station, speed and length."""
-        self._merge_position[rows] = columns[0]
-        values = (column.tolist() for column in (rows, *columns))
-        for row, merge_position, station, speed, length in zip(*values, strict=True):
-            name = self._names[row]
-            where = self.ramp.place(path, station, merge_position)
-            self.session.place(name, self._id(row % self.count, f"{where.edge}_{where.lane}"), where.position, speed)
-            self._edge[row] = self._edge_number[path == "ramp"][where.edge]
-            self._position[row] = where.position
-            if self._length[row] != length:
-                self.session.set_length(name, length)
-                self._length[row] = length
+    def _place(self, row: int, where: LanePosition, speed: float, length: float) -> None:
+        name = self._names[row]
+        self.session.place(name, self._id(row % self.count, f"{where.edge}_{where.lane}"), where.position, speed)
+        self._edge[row] = self._edge_number[row // self.count][where.edge]
+        self._edge_start[row] = self._starts[self._edge[row]]
+        self._position[row] = where.position
+        if self._length[row] != length:
+            self.session.set_length(name, length)
+            self._length[row] = length
 
     def advance(self, speeds: FloatArray) -> None:
         """See `Plant`; a merging car whose front reaches the merging point in this cycle changes lane in it."""
@@ -159,10 +156,15 @@ class SumoPlant:
 
     def _read(self) -> None:
         position = np.fromiter(self.session.positions(self._names), np.float64, 2 * self.count)
-        self._edge += position < self._position  # cars never back up, so a smaller position is the next edge's
+        crossed = np.flatnonzero(position < self._position)  # cars never back up, so this is the next edge's
+        if len(crossed):
+            self._edge[crossed] += 1
+            self._edge_start[crossed] = self._starts[self._edge[crossed]]
         self._position = position
-        station = (position + self._edge_start[self._edge] - self._merge_position).reshape(2, self.count)
-        self.state = np.concatenate([station, (station - self.state[:2]) / DT])
+        station = (position + self._edge_start - self._merge_position).reshape(2, self.count)
+        np.subtract(station, self.state[:2], out=self.state[2:])
+        self.state[2:] /= DT
+        self.state[:2] = station
         for name in self._row.keys() & self.session.colliding():
             self.collided[self._row[name] % self.count] = True
 

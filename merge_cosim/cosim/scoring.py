@@ -105,10 +105,10 @@ def _braking(tracks: Tracks) -> dict[str, FloatArray]:
     braking[tracks.first] = 0.0
     change[1:] = np.abs(braking[1:] - braking[:-1])
     change[tracks.first], change[tracks.first + 1] = 0.0, 0.0
-    hardest, jerk_sum = tracks.fill(0.0), tracks.fill(0.0)
-    np.maximum.at(hardest, tracks.encounter, braking)
-    np.add.at(jerk_sum, tracks.encounter, change)  # cycle after cycle: the same bytes whatever else is scored
-    return {"hardest_braking": hardest, "jerk_sum": jerk_sum}
+    return {
+        "hardest_braking": np.maximum.reduceat(braking, tracks.first),
+        "jerk_sum": np.bincount(tracks.encounter, change),  # one after the other, so what else is scored changes no bit
+    }
 
 
 def _crossings(tracks: Tracks) -> dict[str, FloatArray]:
@@ -124,29 +124,27 @@ def _crossings(tracks: Tracks) -> dict[str, FloatArray]:
         ("merging_cleared_s", merging, states.merging_length),
     ):
         edge = np.broadcast_to(line - TOLERANCE, station.shape)
-        past = station >= edge
-        after = 1 + np.flatnonzero(past[1:] & ~past[:-1] & (tracks.age[1:] > 0))
-        before, encounter = after - 1, tracks.encounter[after]
+        reached = tracks.count(station < edge)
+        crossing = np.flatnonzero((reached > 0) & (reached <= tracks.cycles))
+        after = tracks.first[crossing] + reached[crossing]
+        before = after - 1
         part = (edge[after] + TOLERANCE - station[before]) / (station[after] - station[before])
         part = np.minimum(np.maximum(part, 0.0), 1.0)
         found[name] = tracks.fill(np.nan)
-        found[name][encounter] = (tracks.age[before] + part) * DT
+        found[name][crossing] = (reached[crossing] - 1 + part) * DT
         if name == "host_reached_s":
             other = merging[before] + part * (merging[after] - merging[before])
             leader_length = np.where(other >= -TOLERANCE, states.merging_length[after], states.host_length[after])
-            found["distance_m"][encounter] = np.abs(other)
-            found["gap_m"][encounter] = np.abs(other) - leader_length
+            found["distance_m"][crossing] = np.abs(other)
+            found["gap_m"][crossing] = np.abs(other) - leader_length
     return found
 
 
 def _gaps(tracks: Tracks, rules: Rules) -> dict[str, AnyArray]:
     """What is scored: from when on, the smallest gap and time to collision, the largest DRAC, and the failure."""
     states, encounter, age = tracks.states, tracks.encounter, tracks.age
-    begun = np.flatnonzero(rules.begun(states) & (age > 0))
-    scored_from = tracks.fill(-1.0)
-    scored_from[encounter[begun[::-1]]] = age[begun[::-1]]  # of each encounter's the first one stays
-    began = scored_from >= 0
-    scored = np.flatnonzero(age >= np.where(began, scored_from, np.inf)[encounter])
+    start = np.maximum(tracks.count(~rules.begun(states)), 1)
+    scored = np.flatnonzero(age >= start[encounter])
     gap, follows = states.gap[scored], states.merging_ahead[scored]
     closing = np.where(follows, 1.0, -1.0) * (states.host_speed - states.merging_speed)[scored]
     min_gap, min_ttc, max_drac = tracks.fill(np.inf), tracks.fill(np.inf), tracks.fill(0.0)
@@ -157,11 +155,12 @@ def _gaps(tracks: Tracks, rules: Rules) -> dict[str, AnyArray]:
     drac = np.divide(fast * fast, 2.0 * near, out=np.zeros_like(near), where=near > TOLERANCE)
     np.maximum.at(max_drac, whose, drac)
     later = np.where(states.merging_ahead[tracks.last], HOST_INTO_MERGING, MERGING_INTO_HOST)
-    kind = np.where(tracks.cycles == scored_from, SIDE, later)
+    kind = np.where(tracks.cycles == start, SIDE, later)
+    began = start <= tracks.cycles
     return {
-        "kind": np.where(began & (states.gap[tracks.last] < -TOLERANCE), kind, 0.0),
-        "scored_from": scored_from,
-        "scored_to_end": began & (tracks.cycles >= scored_from + rules.horizon_cycles),
+        "kind": np.where(began & (states.gap[tracks.last] < -TOLERANCE), kind, 0),
+        "scored_from": np.where(began, start, -1),
+        "scored_to_end": tracks.cycles >= start + rules.horizon_cycles,
         "min_gap_m": min_gap,
         "min_ttc_s": min_ttc,
         "max_drac": max_drac,

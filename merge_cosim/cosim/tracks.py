@@ -10,7 +10,7 @@ import numpy as np
 
 from merge_cosim.encounter import Encounters
 from merge_cosim.observation import Observation
-from merge_cosim.units import FloatArray, IntArray
+from merge_cosim.units import BoolArray, FloatArray, IntArray
 
 DECIMALS = 6
 """What is observed is rounded to 1e-6 m and m/s: the designed grid is full of ties that the last bits would break."""
@@ -45,7 +45,7 @@ class Recorder:
 
     def placed(self, rows: IntArray, state: FloatArray) -> None:
         """Let new encounters begin at `rows` in the present cycle; of the old ones there the last state is lost."""
-        self._cycles[self._now, :4, rows] = state[:, rows].round(DECIMALS).T
+        self._cycles[self._now][:4, rows] = state.round(DECIMALS)
 
     def track(self, row: int, cycles: int) -> FloatArray:
         """The states and beliefs of the last `cycles` cycles at a row, and the present one; shape (cycles + 1, 5)."""
@@ -76,7 +76,7 @@ class Tracks:
         """Lay the recorded `tracks` of `cases` end to end."""
         case, sizes = np.array(cases), np.array([len(track) for track in tracks])
         host_station, merging_station, host_speed, merging_speed, log_odds = np.concatenate(tracks).T.copy()
-        lengths = (np.repeat(of_car[case], sizes) for of_car in (encounters.host_length, encounters.merging_length))
+        lengths = np.repeat(encounters.start[4:, case], sizes, axis=1)
         states = Observation(host_station, host_speed, merging_station, merging_speed, *lengths)
         return cls(states, log_odds, case, sizes - 1)
 
@@ -99,6 +99,13 @@ class Tracks:
     def age(self) -> IntArray:
         """The cycle of each state, counted from its encounter's start, shape (N,)."""
         return np.arange(len(self.log_odds)) - self.first[self.encounter]
+
+    def count(self, where: BoolArray) -> IntArray:
+        """In how many of its states something holds for each encounter, shape (m,).
+
+        Cars never back up; so of the states before a line this is also the cycle in which the line is reached.
+        """
+        return np.add.reduceat(where, self.first, dtype=np.int64)
 
     def fill(self, value: float) -> FloatArray:
         """A measure with the same value for every encounter, shape (m,)."""
