@@ -132,7 +132,7 @@ class _Loop:
         self.case = np.full(count, -1)
         self.age = np.zeros(count, dtype=np.int64)
         self.score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
-        self.speeds, self.lengths = np.zeros((2, count)), np.ones((2, count))
+        self.speeds = np.zeros((2, count))
         self.next_case = 0
         self.over: dict[int, FloatArray] = {}
         self.columns: dict[str, AnyArray] = {"sumo_collision": np.zeros(n, dtype=bool)}
@@ -140,16 +140,16 @@ class _Loop:
     def run(self) -> Run:
         begin, stepped = perf_counter(), self.plant.step_s
         self._refill(np.arange(self.plant.count))
-        now = self._observe()
         while np.count_nonzero(self.active):
-            now = self._cycle(now)
+            self._cycle()
         self._score()
         self.effort.wall_s = perf_counter() - begin
         self.effort.step_s = self.plant.step_s - stepped
         return Run(self.columns, self.effort, {case: dict(trace) for case, trace in self.traces.items()})
 
-    def _cycle(self, now: Observation) -> Observation:
+    def _cycle(self) -> None:
         begin = perf_counter()
+        now = self.recorder.seen
         observed = self.merging_car.observed_speed(self.age, now.merging_speed)
         seen = now if observed is now.merging_speed else replace(now, merging_speed=observed)
         log_odds = self.driver.estimator.update(seen)
@@ -168,17 +168,10 @@ class _Loop:
         self.recorder.moved(self.plant.state)
         self.age += 1
         self.effort.method_s += decided - begin
-        after = self._observe()
-        rows = np.flatnonzero(self.active & self.ending.over(self.age, after))
+        rows = np.flatnonzero(self.active & self.ending.over(self.age, self.recorder.seen))
         if len(rows):
             self._finish(rows)
             self._refill(rows)
-            after = self._observe()
-        return after
-
-    def _observe(self) -> Observation:
-        host_station, station, host_speed, speed = self.recorder.state
-        return Observation(host_station, host_speed, station, speed, *self.lengths)
 
     def _refill(self, rows: IntArray) -> None:
         cases = np.arange(self.next_case, min(self.next_case + len(rows), len(self.encounters)))
@@ -191,9 +184,8 @@ class _Loop:
             return
         self.plant.place(rows, self.encounters, cases)
         start = self.encounters.start[:, cases]
-        self.lengths[:, rows] = start[4:]
         self.closed_form[:, rows] = start[:2]
-        self.recorder.placed(rows, start[:4])
+        self.recorder.placed(rows, start)
         self.merging_car.reset(rows, cases)
         self.driver.estimator.reset(rows, self.encounters.label[cases], self.keys[cases])
         self.driver.controller.reset(rows)

@@ -59,20 +59,20 @@ class Ending:
         self._rules = rules
         self._horizon, self._time_out = rules.horizon_cycles, rules.time_out_cycles
         self._until = np.full(count, NEVER)
-        self._waiting = np.zeros(count, dtype=bool)
+        self._scored = np.zeros(count, dtype=bool)
 
     def reset(self, rows: IntArray, limit: IntArray) -> None:
         """Begin anew at `rows`, each to be scored until cycle `limit` at most."""
         self._until[rows] = np.minimum(limit, self._time_out)
-        self._waiting[rows] = True
+        self._scored[rows] = False
 
     def over(self, age: IntArray, now: Observation) -> BoolArray:
         """Where an encounter has failed, its horizon has been seen, or its time is up; `age` is the cycle of `now`."""
-        begins = self._waiting & self._rules.begun(now)
+        begins = self._rules.begun(now) > self._scored
         if np.count_nonzero(begins):
-            self._waiting[begins] = False
+            self._scored[begins] = True
             self._until[begins] = np.minimum(self._until[begins], age[begins] + self._horizon)
-        return (age >= self._until) | ((now.gap < -TOLERANCE) & ~self._waiting)
+        return (age >= self._until) | (self._scored & (now.gap < -TOLERANCE))
 
 
 def score(tracks: Tracks, rules: Rules, log: ReplayLog | None = None) -> dict[str, AnyArray]:

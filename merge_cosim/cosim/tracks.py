@@ -20,19 +20,25 @@ class Recorder:
     """Keeps the last cycles of all encounters of a batch, as many as the longest encounter has.
 
     Attributes:
-        state: The present cycle, rounded, shape (4, count), in the order of `Plant.state`; not to be written to.
+        lengths: Lengths of hosts and merging cars [m], shape (2, count).
     """
 
     def __init__(self, count: int, longest: int) -> None:
         """Make room for `count` encounters of at most `longest` cycles."""
+        self.lengths = np.ones((2, count))
         self._cycles = np.zeros((longest + 1, 5, count))
-        self._shown = self._cycles.view()
-        self._shown.flags.writeable = False
+        shown = self._cycles.view()
+        shown.flags.writeable = False
+        self._seen = [
+            Observation(host, host_speed, merging, merging_speed, *self.lengths)
+            for host, merging, host_speed, merging_speed, _ in shown
+        ]
         self._now = 0
 
     @property
-    def state(self) -> FloatArray:
-        return self._shown[self._now, :4]
+    def seen(self) -> Observation:
+        """The present cycle, rounded; it is made once for all, and shows what is placed later in the same cycle."""
+        return self._seen[self._now]
 
     def believed(self, log_odds: FloatArray) -> None:
         """Keep the beliefs of the present cycle, shape (count,)."""
@@ -43,16 +49,17 @@ class Recorder:
         self._now = (self._now + 1) % len(self._cycles)
         state.round(DECIMALS, out=self._cycles[self._now, :4])
 
-    def placed(self, rows: IntArray, state: FloatArray) -> None:
-        """Let new encounters begin at `rows` in the present cycle; of the old ones there the last state is lost."""
-        self._cycles[self._now][:4, rows] = state.round(DECIMALS)
+    def placed(self, rows: IntArray, start: FloatArray) -> None:
+        """Let encounters begin at `rows` in the present cycle (`Encounters.start`); of the old ones the last state goes."""
+        self._cycles[self._now][:4, rows] = start[:4].round(DECIMALS)
+        self.lengths[:, rows] = start[4:]
 
     def track(self, row: int, cycles: int) -> FloatArray:
-        """The states and beliefs of the last `cycles` cycles at a row, and the present one; shape (cycles + 1, 5)."""
-        first = self._now - cycles
+        """The states and beliefs of the last `cycles` cycles at a row, and the present one; shape (5, cycles + 1)."""
+        first, now = self._now - cycles, self._now + 1
         if first >= 0:
-            return self._cycles[first : self._now + 1, :, row].copy()
-        return np.concatenate([self._cycles[first:, :, row], self._cycles[: self._now + 1, :, row]])
+            return self._cycles[first:now, :, row].T.copy()
+        return np.concatenate([self._cycles[first:, :, row].T, self._cycles[:now, :, row].T], axis=1)
 
 
 @dataclass(frozen=True)
@@ -74,8 +81,8 @@ class Tracks:
     @classmethod
     def of(cls, encounters: Encounters, cases: Sequence[int], tracks: Sequence[FloatArray]) -> Tracks:
         """Lay the recorded `tracks` of `cases` end to end."""
-        case, sizes = np.array(cases), np.array([len(track) for track in tracks])
-        host_station, merging_station, host_speed, merging_speed, log_odds = np.concatenate(tracks).T.copy()
+        case, sizes = np.array(cases), np.array([track.shape[1] for track in tracks])
+        host_station, merging_station, host_speed, merging_speed, log_odds = np.concatenate(tracks, axis=1)
         lengths = np.repeat(encounters.start[4:, case], sizes, axis=1)
         states = Observation(host_station, host_speed, merging_station, merging_speed, *lengths)
         return cls(states, log_odds, case, sizes - 1)
