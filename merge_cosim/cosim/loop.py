@@ -11,7 +11,7 @@ import numpy as np
 
 from merge_cosim.control.base import Controller
 from merge_cosim.cosim.plant import Plant
-from merge_cosim.cosim.scoring import Ending, Rules, score
+from merge_cosim.cosim.scoring import Ending, Rules, expected_cycles, score
 from merge_cosim.cosim.tracks import Recorder, Tracks
 from merge_cosim.encounter import NEVER, Encounters
 from merge_cosim.intention.base import Estimator
@@ -133,7 +133,7 @@ class _Loop:
         self.age = np.zeros(count, dtype=np.int64)
         self.score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
         self.speeds = np.zeros((2, count))
-        self.next_case = 0
+        self.queue = np.argsort(-expected_cycles(encounters, rules), kind="stable")  # so that all tiles end together
         self.over: dict[int, FloatArray] = {}
         self.columns: dict[str, AnyArray] = {"sumo_collision": np.zeros(n, dtype=bool)}
 
@@ -174,8 +174,7 @@ class _Loop:
             self._refill(rows)
 
     def _refill(self, rows: IntArray) -> None:
-        cases = np.arange(self.next_case, min(self.next_case + len(rows), len(self.encounters)))
-        self.next_case += len(cases)
+        cases, self.queue = self.queue[: len(rows)], self.queue[len(rows) :]
         self.case[rows[len(cases) :]] = -1
         rows = rows[: len(cases)]
         self.case[rows], self.age[rows] = cases, 0

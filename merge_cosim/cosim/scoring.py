@@ -11,7 +11,7 @@ from pydantic import PositiveFloat
 from merge_cosim.cosim.decisions import decisions
 from merge_cosim.cosim.likeness import likeness
 from merge_cosim.cosim.tracks import Tracks
-from merge_cosim.encounter import NEVER, ReplayLog
+from merge_cosim.encounter import NEVER, Encounters, ReplayLog
 from merge_cosim.observation import Observation
 from merge_cosim.units import DT, TOLERANCE, AnyArray, BoolArray, FloatArray, IntArray
 
@@ -19,6 +19,8 @@ KINDS = ("", "side", "host_into_merging", "merging_into_host", "host_into_leader
 SIDE, HOST_INTO_MERGING, MERGING_INTO_HOST, HOST_INTO_LEADER = 1, 2, 3, 4
 GOAL = 50.0
 """Station [m] at which the delay is taken."""
+USUAL_ACCELERATION = 1.0
+"""Acceleration [m/s^2] by which the length of a case is guessed."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,19 @@ class Rules:
         if self.overlap_from == "both":
             return np.minimum(now.host_station, now.merging_station) >= -TOLERANCE
         return now.merging_in_lane
+
+
+def expected_cycles(encounters: Encounters, rules: Rules) -> FloatArray:
+    """Rough length of each case: both cars accelerate to the merging point, then it is scored; shape (n,)."""
+    arrivals = [
+        (np.sqrt(speed**2 + 2 * USUAL_ACCELERATION * np.maximum(-station, 0.0)) - speed) / USUAL_ACCELERATION
+        for station, speed in (
+            (encounters.host_station, encounters.host_speed),
+            (encounters.merging_station, encounters.merging_speed),
+        )
+    ]
+    expected: FloatArray = np.minimum(np.maximum(*arrivals) + rules.horizon, rules.time_out) / DT
+    return expected
 
 
 class Ending:
