@@ -1,4 +1,4 @@
-"""What every encounter of a batch goes through, cycle by cycle: recorded while it runs, laid end to end when it is over."""
+"""What the encounters of a batch go through: recorded cycle by cycle, laid end to end when they are over."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Recorder:
         state.round(DECIMALS, out=self._cycles[self._now, :4])
 
     def placed(self, rows: IntArray, start: FloatArray) -> None:
-        """Let encounters begin at `rows` in the present cycle (`Encounters.start`); of the old ones the last state goes."""
+        """Begin encounters at `rows` in the present cycle, from `Encounters.start`; the old ones' last state is lost."""
         self._cycles[self._now][:4, rows] = start[:4].round(DECIMALS)
         self.lengths[:, rows] = start[4:]
 

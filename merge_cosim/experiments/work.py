@@ -24,9 +24,9 @@ from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.units import FloatArray
 
-TILES = 160
-"""Encounters side by side in one SUMO. Fewer spread the cost of a cycle's Python over fewer cars; with more than about
-190 SUMO's own step costs more per car, as its cars no longer fit the processor's cache."""
+TILES = 192
+"""Encounters side by side in one SUMO. From 128 to 208 tiles a case costs the same: more of them spread the cost of a
+cycle's Python over more cars, but SUMO's own step costs more per car, as more cars fit its cache less well."""
 
 PIECE_CASES = 1_000
 """Most encounters that are handed out at a time: enough to keep the tiles busy, few enough to lose little when
