@@ -50,7 +50,7 @@ class Recorder:
         state.round(DECIMALS, out=self._cycles[self._now, :4])
 
     def placed(self, rows: IntArray, start: FloatArray) -> None:
-        """Begin encounters at `rows` in the present cycle, from `Encounters.start`; the old ones' last state is lost."""
+        """Begin encounters at `rows` in the present cycle, from `Encounters.start`; the old ones' last state goes."""
         self._cycles[self._now][:4, rows] = start[:4].round(DECIMALS)
         self.lengths[:, rows] = start[4:]
 
