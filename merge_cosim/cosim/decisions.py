@@ -32,7 +32,7 @@ def decisions(tracks: Tracks) -> dict[str, FloatArray]:
     kept = {"decision_flips": decision_flips, "last_decision": last_decision, "decided_from": decided_from}
     start = states.merging_station[tracks.first]
     for gate in GATES:
-        reached = tracks.count(states.merging_station < -gate - TOLERANCE)
+        reached = tracks.reached(states.merging_station >= -gate - TOLERANCE)
         met = np.flatnonzero((reached < tracks.cycles) & (start <= -gate + TOLERANCE))
         at = tracks.first[met] + reached[met]
         met, at = met[still_open[at]], at[still_open[at]]

@@ -11,7 +11,7 @@ import numpy as np
 
 from merge_cosim.control.base import Controller
 from merge_cosim.cosim.plant import Plant
-from merge_cosim.cosim.scoring import Ending, Rules, expected_cycles, score
+from merge_cosim.cosim.scoring import Rules, Watch, expected_cycles, score
 from merge_cosim.cosim.tracks import Recorder, Tracks
 from merge_cosim.encounter import NEVER, Encounters
 from merge_cosim.intention.base import Estimator
@@ -121,7 +121,7 @@ class _Loop:
         self.plant, self.encounters, self.driver, self.merging_car = plant, encounters, driver, merging_car
         self.rules, self.setting, self.traced = rules, setting, traced
         self.recorder = Recorder(count, rules.time_out_cycles)
-        self.ending = Ending(count, rules)
+        self.watch = Watch(count, rules)
         self.closed_form = np.zeros((2, count))
         self.effort = Effort()
         self.traces: dict[int, dict[str, list[float]]] = {case: defaultdict(list) for case in traced}
@@ -168,7 +168,7 @@ class _Loop:
         self.recorder.moved(self.plant.state)
         self.age += 1
         self.effort.method_s += decided - begin
-        rows = np.flatnonzero(self.active & self.ending.over(self.age, self.recorder.seen))
+        rows = np.flatnonzero(self.active & self.watch.over(self.age, self.recorder.seen))
         if len(rows):
             self._finish(rows)
             self._refill(rows)
@@ -188,7 +188,7 @@ class _Loop:
         self.merging_car.reset(rows, cases)
         self.driver.estimator.reset(rows, self.encounters.label[cases], self.keys[cases])
         self.driver.controller.reset(rows)
-        self.ending.reset(rows, self.score_until[cases])
+        self.watch.reset(rows, self.score_until[cases])
 
     def _finish(self, rows: IntArray) -> None:
         cases = self.case[rows]

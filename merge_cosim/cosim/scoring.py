@@ -67,7 +67,7 @@ def expected_cycles(encounters: Encounters, rules: Rules) -> FloatArray:
     return expected
 
 
-class Ending:
+class Watch:
     """Tells, cycle by cycle, which encounters of a batch are over: this alone must be known at once."""
 
     def __init__(self, count: int, rules: Rules) -> None:
@@ -88,6 +88,15 @@ class Ending:
             self._scored[begins] = True
             self._until[begins] = np.minimum(self._until[begins], age[begins] + self._horizon)
         return (age >= self._until) | (self._scored & (now.gap < -TOLERANCE))
+
+
+def ends(tracks: Tracks, rules: Rules) -> IntArray:
+    """The cycles in which encounters were over that were recorded beyond that, by the rules of `Watch`; shape (m,)."""
+    start = tracks.reached(rules.begun(tracks.states) & (tracks.age > 0))
+    scored = tracks.age >= start[tracks.encounter]
+    failed = tracks.reached(scored & (tracks.states.gap < -TOLERANCE))
+    longest = np.minimum(tracks.cycles, rules.time_out_cycles)
+    return np.minimum(np.minimum(start + rules.horizon_cycles, failed), longest)
 
 
 def score(tracks: Tracks, rules: Rules, log: ReplayLog | None = None) -> dict[str, AnyArray]:
@@ -139,7 +148,7 @@ def _crossings(tracks: Tracks) -> dict[str, FloatArray]:
         ("merging_cleared_s", merging, states.merging_length),
     ):
         edge = np.broadcast_to(line - TOLERANCE, station.shape)
-        reached = tracks.count(station < edge)
+        reached = tracks.reached(station >= edge)
         crossing = np.flatnonzero((reached > 0) & (reached <= tracks.cycles))
         after = tracks.first[crossing] + reached[crossing]
         before = after - 1
@@ -158,7 +167,7 @@ def _crossings(tracks: Tracks) -> dict[str, FloatArray]:
 def _gaps(tracks: Tracks, rules: Rules) -> dict[str, AnyArray]:
     """What is scored: from when on, the smallest gap and time to collision, the largest DRAC, and the failure."""
     states, encounter, age = tracks.states, tracks.encounter, tracks.age
-    start = np.maximum(tracks.count(~rules.begun(states)), 1)
+    start = tracks.reached(rules.begun(states) & (age > 0))
     scored = np.flatnonzero(age >= start[encounter])
     gap, follows = states.gap[scored], states.merging_ahead[scored]
     closing = np.where(follows, 1.0, -1.0) * (states.host_speed - states.merging_speed)[scored]

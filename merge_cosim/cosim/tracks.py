@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
 
-from merge_cosim.encounter import Encounters
+from merge_cosim.encounter import NEVER, Encounters
 from merge_cosim.observation import Observation
 from merge_cosim.units import BoolArray, FloatArray, IntArray
 
@@ -81,8 +81,11 @@ class Tracks:
     @classmethod
     def of(cls, encounters: Encounters, cases: Sequence[int], tracks: Sequence[FloatArray]) -> Tracks:
         """Lay the recorded `tracks` of `cases` end to end."""
-        case, sizes = np.array(cases), np.array([track.shape[1] for track in tracks])
-        host_station, merging_station, host_speed, merging_speed, log_odds = np.concatenate(tracks, axis=1)
+        case = np.array(cases, dtype=np.int64)
+        sizes = np.array([track.shape[1] for track in tracks], dtype=np.int64)
+        host_station, merging_station, host_speed, merging_speed, log_odds = np.concatenate(
+            [np.empty((5, 0)), *tracks], axis=1
+        )
         lengths = np.repeat(encounters.start[4:, case], sizes, axis=1)
         states = Observation(host_station, host_speed, merging_station, merging_speed, *lengths)
         return cls(states, log_odds, case, sizes - 1)
@@ -107,12 +110,15 @@ class Tracks:
         """The cycle of each state, counted from its encounter's start, shape (N,)."""
         return np.arange(len(self.log_odds)) - self.first[self.encounter]
 
-    def count(self, where: BoolArray) -> IntArray:
-        """In how many of its states something holds for each encounter, shape (m,).
+    def reached(self, where: BoolArray) -> IntArray:
+        """The first cycle of each encounter in which something holds; `NEVER` if in none. Shape (m,)."""
+        return np.minimum.reduceat(np.where(where, self.age, NEVER), self.first)
 
-        Cars never back up; so of the states before a line this is also the cycle in which the line is reached.
-        """
-        return np.add.reduceat(where, self.first, dtype=np.int64)
+    def until(self, cycles: IntArray) -> Tracks:
+        """The encounters up to the given cycles, shape (m,)."""
+        kept = self.age <= cycles[self.encounter]
+        states = Observation(*(getattr(self.states, field.name)[kept] for field in fields(Observation)))
+        return Tracks(states, self.log_odds[kept], self.case, cycles)
 
     def fill(self, value: float) -> FloatArray:
         """A measure with the same value for every encounter, shape (m,)."""

@@ -3,8 +3,19 @@
 import numpy as np
 import pytest
 from cases import random_encounters
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from merge_cosim.cosim.scoring import HOST_INTO_MERGING, MERGING_INTO_HOST, SIDE, Ending, Rules, expected_cycles, score
+from merge_cosim.cosim.scoring import (
+    HOST_INTO_MERGING,
+    MERGING_INTO_HOST,
+    SIDE,
+    Rules,
+    Watch,
+    ends,
+    expected_cycles,
+    score,
+)
 from merge_cosim.cosim.tracks import Recorder, Tracks
 from merge_cosim.encounter import NEVER, Ragged, ReplayLog
 from merge_cosim.observation import Observation
@@ -23,13 +34,13 @@ def laid(host, merging, length=5.0, odds=None, speeds=None):
     return Tracks(states, odds, np.array([0]), np.array([len(host) - 1]))
 
 
-def ends(tracks, rules):
+def watched(tracks, rules):
     """The cycle in which an encounter is over, as the loop is told; None if it goes on."""
-    ending, states = Ending(1, rules), tracks.states
-    ending.reset(np.array([0]), np.array([NEVER]))
+    watch, states = Watch(1, rules), tracks.states
+    watch.reset(np.array([0]), np.array([NEVER]))
     for k in range(1, len(states.host_station)):
         now = Observation(*(getattr(states, field)[k : k + 1] for field in Observation.__match_args__))
-        if ending.over(np.array([k]), now)[0]:
+        if watch.over(np.array([k]), now)[0]:
             return k
     return None
 
@@ -37,7 +48,7 @@ def ends(tracks, rules):
 def run(host, merging, length=5.0, rules=DEFAULTS, decisions=None):
     """Score one encounter from lists of stations up to its end; returns the measures and the cycle of the end."""
     odds = [1.0 if decision else -1.0 for decision in decisions] if decisions else None
-    over = ends(laid(host, merging, length), rules)
+    over = watched(laid(host, merging, length), rules)
     until = None if over is None else over + 1
     tracks = laid(host[:until], merging[:until], length, None if odds is None else odds[:until])
     return score(tracks, rules), over
@@ -192,6 +203,26 @@ def test_encounters_are_scored_alike_alone_and_together():
             np.testing.assert_array_equal(values, together[name][number : number + 1], err_msg=name)
 
 
+@settings(max_examples=100)
+@given(st.integers(0, 10_000), st.sampled_from(["both", "lane_change"]))
+def test_the_end_is_the_same_while_it_runs_and_afterwards(seed, overlap_from):
+    rng = np.random.default_rng(seed)
+    rules = Rules(horizon=1.0, time_out=4.0, overlap_from=overlap_from)
+    host, merging = (np.cumsum(rng.uniform(0, 3, 60)) - rng.uniform(0, 90) for _ in range(2))
+    tracks = laid(host, merging)
+    assert ends(tracks, rules)[0] == watched(tracks, rules)
+    short = laid(host[:9], merging[:9])
+    assert ends(short, rules)[0] == (watched(short, rules) or 8)
+
+
+def test_what_was_recorded_after_the_end_does_not_count():
+    tracks = laid(line(-5, 10), line(-8, 10))
+    ended = tracks.until(ends(tracks, Rules()))
+    assert ended.cycles.tolist() == [8]
+    for name, values in score(laid(line(-5, 10, 9), line(-8, 10, 9)), Rules()).items():
+        np.testing.assert_array_equal(score(ended, Rules())[name], values, err_msg=name)
+
+
 def test_the_recorder_gives_back_what_went_through_it():
     recorder, encounters = Recorder(3, longest=4), random_encounters(5, seed=7)
     recorder.placed(np.arange(3), encounters.start[:, :3])
@@ -219,3 +250,10 @@ def test_longer_approaches_are_expected_to_last_longer():
     assert (cycles <= 400).all()
     nearest = np.argmin(cycles)
     assert encounters.host_station[nearest] > np.min(encounters.host_station)
+
+
+def test_nothing_to_score_gives_no_rows():
+    encounters = random_encounters(3, seed=9)
+    tracks = Tracks.of(encounters, [], [])
+    assert ends(tracks, Rules()).shape == (0,)
+    assert all(values.shape == (0,) for values in score(tracks, Rules()).values())
