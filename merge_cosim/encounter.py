@@ -144,6 +144,12 @@ class Encounters:
     def __len__(self) -> int:
         return len(self.case)
 
+    @cached_property
+    def start(self) -> FloatArray:
+        """Stations of host and merging car, then their speeds, then their lengths, shape (6, n) [m, m/s, m]."""
+        states = (self.host_station, self.merging_station, self.host_speed, self.merging_speed)
+        return np.array([*states, self.host_length, self.merging_length])
+
     def take(self, rows: IntArray) -> Encounters:
         """Return the chosen encounters, in that order."""
         arrays = {f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "log"}

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from merge_cosim.units import DT, TOLERANCE, BoolArray, FloatArray, time_to_arrival
 
 
@@ -20,7 +22,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Observation:
-    """One cycle of a batch of encounters; every array has shape (n,).
+    """One cycle of a batch of encounters, or some cycles of it laid end to end; every array has shape (n,).
 
     Attributes:
         host_station, host_speed: State of the host [m, m/s].
@@ -54,3 +56,9 @@ class Observation:
     def merging_ahead(self) -> BoolArray:
         """The merging car's front is level with the host's or past it."""
         return self.merging_station - self.host_station >= -TOLERANCE
+
+    @property
+    def gap(self) -> FloatArray:
+        """Bumper-to-bumper distance [m] of whoever is behind to whoever is ahead; negative where the bodies overlap."""
+        leader_length = np.where(self.merging_ahead, self.merging_length, self.host_length)
+        return np.abs(self.merging_station - self.host_station) - leader_length

@@ -112,10 +112,18 @@ def page(found: Mapping[str, Any], command: str) -> str:
     if found["highway_env"]:
         theirs = found["highway_env"]
         parts.append(
-            f"For scale, another simulator with other models: highway-env's `merge-v0` makes {theirs['steps_per_s']:,} "
-            f"simulated steps, {theirs['vehicle_steps_per_s']:,} vehicle-steps, per second.\n"
+            f"For scale, another simulator with other models: `merge-v0` of highway-env {theirs['version']} makes "
+            f"{theirs['steps_per_s']:,} simulated steps, {theirs['vehicle_steps_per_s']:,} vehicle-steps, per second.\n"
         )
     parts += [UPDATES, _table(found["estimators"]), SCALING, _table(found["scaling"])]
+    largest = found["scaling"][-1]
+    for alone in found["scaling"]:
+        if alone["cases"] == largest["cases"] and alone is not largest:
+            parts.append(
+                f"Over {largest['cases']:,} cases {largest['processes']} processes are "
+                f"{alone['run_s'] / largest['run_s']:.2f} times as fast as {alone['processes']} by `run_s`, and "
+                f"{alone['wall_s'] / largest['wall_s']:.2f} times with planning and summing up, done by one.\n"
+            )
     return "\n".join(parts)
 
 

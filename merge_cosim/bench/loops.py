@@ -10,6 +10,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -88,12 +89,13 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
     }
 
 
-def highway() -> dict[str, float] | None:
+def highway() -> dict[str, Any] | None:
     """Simulated steps, and vehicles times steps, per second of highway-env's merge scene; None if not installed."""
     if importlib.util.find_spec("highway_env") is None:
         return None
     found = _json_of(HIGHWAY)
     return {
+        "version": version("highway-env"),
         "steps_per_s": round(found["steps"] / found["wall_s"], 1),
         "vehicle_steps_per_s": round(found["vehicle_steps"] / found["wall_s"], 1),
     }

@@ -10,17 +10,18 @@ from time import perf_counter
 import numpy as np
 
 from merge_cosim.control.base import Controller
-from merge_cosim.cosim.plant import NumpyPlant, Plant
-from merge_cosim.cosim.scoring import Rules, Scorer
+from merge_cosim.cosim.plant import Plant
+from merge_cosim.cosim.scoring import Rules, Watch, expected_cycles, score
+from merge_cosim.cosim.tracks import Recorder, Tracks
 from merge_cosim.encounter import NEVER, Encounters
 from merge_cosim.intention.base import Estimator
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.streams import stream_keys
 from merge_cosim.traffic.base import MergingCar
-from merge_cosim.units import AnyArray, BoolArray, FloatArray, IntArray
+from merge_cosim.units import DT, AnyArray, BoolArray, FloatArray, IntArray
 
-DECIMALS = 6
-"""What is observed is rounded to 1e-6 m and m/s: the designed grid is full of ties that the last bits would break."""
+SCORED_TOGETHER = 128
+"""Encounters that are over wait until so many can be scored in one go; their tracks then still fit the cache."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Run:
     """What came out of a batch of n encounters.
 
     Attributes:
-        columns: The scorer's measures and the state at the end, shape (n,) each.
+        columns: All measures of `score`, and `sumo_collision`; shape (n,) each.
         effort: What it cost.
         traces: For each traced case, cycle by cycle: `host_station`, `log_odds`, ...
     """
@@ -121,9 +122,10 @@ class _Loop:
     ) -> None:
         count, n = plant.count, len(encounters)
         self.plant, self.encounters, self.driver, self.merging_car = plant, encounters, driver, merging_car
-        self.setting, self.traced = setting, traced
-        self.scorer = Scorer(count, rules, encounters.log)
-        self.shadow = NumpyPlant(count)
+        self.rules, self.setting, self.traced = rules, setting, traced
+        self.recorder = Recorder(count, rules.time_out_cycles)
+        self.watch = Watch(count, rules)
+        self.closed_form = np.zeros((2, count))
         self.effort = Effort()
         self.traces: dict[int, dict[str, list[float]]] = {case: defaultdict(list) for case in traced}
         driver.estimator.start(count, setting)
@@ -133,101 +135,86 @@ class _Loop:
         self.case = np.full(count, -1)
         self.age = np.zeros(count, dtype=np.int64)
         self.score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
-        self.limit = np.full(count, NEVER)
-        self.host_length, self.merging_length = np.ones(count), np.ones(count)
-        self.next_case = 0
-        self.scored = np.zeros((len(self.scorer.block), n))
-        self.columns: dict[str, AnyArray] = {
-            "end_cycle": np.zeros(n, dtype=np.int64),
-            "end_station": np.zeros(n),
-            "end_speed": np.zeros(n),
-            "end_merging_station": np.zeros(n),
-            "end_merging_speed": np.zeros(n),
-            "scored_to_end": np.zeros(n, dtype=bool),
-            **dict(zip(self.scorer.columns, self.scored, strict=True)),
-        }
+        self.speeds = np.zeros((2, count))
+        self.queue = np.argsort(-expected_cycles(encounters, rules), kind="stable")  # so that all tiles end together
+        self.over: dict[int, FloatArray] = {}
+        self.columns: dict[str, AnyArray] = {"sumo_collision": np.zeros(n, dtype=bool)}
 
     def run(self) -> Run:
         begin, stepped = perf_counter(), self.plant.step_s
         self._refill(np.arange(self.plant.count))
-        now = self._observe()
-        while (active := self.case >= 0).any():
-            now = self._cycle(now, active)
+        while np.count_nonzero(self.active):
+            self._cycle()
+        self._score()
         self.effort.wall_s = perf_counter() - begin
         self.effort.step_s = self.plant.step_s - stepped
         return Run(self.columns, self.effort, {case: dict(trace) for case, trace in self.traces.items()})
 
-    def _cycle(self, now: Observation, active: BoolArray) -> Observation:
+    def _cycle(self) -> None:
         begin = perf_counter()
+        now = self.recorder.seen
         observed = self.merging_car.observed_speed(self.age, now.merging_speed)
         seen = now if observed is now.merging_speed else replace(now, merging_speed=observed)
         log_odds = self.driver.estimator.update(seen)
         not_yield = log_odds >= 0.0
         target = np.where(now.merging_in_lane, now.merging_ahead, not_yield)
         acceleration = self.driver.controller.command(seen, log_odds, target)
-        host_speed = np.maximum(now.host_speed + acceleration * self.setting.dt, 0.0)
+        np.maximum(now.host_speed + acceleration * self.setting.dt, 0.0, out=self.speeds[0])
         decided = perf_counter()
-        merging_speed = np.where(active, self.merging_car.next_speed(self.age, now), 0.0)
-        host_speed = np.where(active, host_speed, 0.0)
-        self.scorer.decided(self.age, now, log_odds, not_yield)
+        self.speeds[1] = self.merging_car.next_speed(self.age, now)
+        self.speeds *= self.active
+        self.recorder.believed(log_odds)
         if self.traced:
-            self._trace(now, log_odds, not_yield, host_speed)
-        self.plant.advance(host_speed, merging_speed)
-        self.shadow.advance(host_speed, merging_speed)
+            self._trace(now, log_odds, not_yield, self.speeds[0])
+        self.plant.advance(self.speeds)
+        self.closed_form += self.speeds * DT
+        self.recorder.moved(self.plant.state)
         self.age += 1
         self.effort.method_s += decided - begin
-        after = self._observe()
-        over = active & (self.scorer.moved(self.age, now, after, self.plant.colliding) | (self.age >= self.limit))
-        if over.any():
-            rows = np.flatnonzero(over)
-            self._finish(rows, after)
+        rows = np.flatnonzero(self.active & self.watch.over(self.age, self.recorder.seen))
+        if len(rows):
+            self._finish(rows)
             self._refill(rows)
-            after = self._observe()
-        return after
-
-    def _observe(self) -> Observation:
-        """The plant's state, rounded: the one place where this happens."""
-        plant = self.plant
-        state = (plant.host_station, plant.host_speed, plant.merging_station, plant.merging_speed)
-        host_station, host_speed, station, speed = np.concatenate(state).round(DECIMALS).reshape(4, plant.count)
-        return Observation(host_station, host_speed, station, speed, self.host_length, self.merging_length)
 
     def _refill(self, rows: IntArray) -> None:
-        cases = np.arange(self.next_case, min(self.next_case + len(rows), len(self.encounters)))
-        self.next_case += len(cases)
+        cases, self.queue = self.queue[: len(rows)], self.queue[len(rows) :]
         self.case[rows[len(cases) :]] = -1
         rows = rows[: len(cases)]
+        self.case[rows], self.age[rows] = cases, 0
+        self.active = self.case >= 0
         if not len(rows):
             return
-        self.case[rows], self.age[rows] = cases, 0
-        self.limit[rows] = self.score_until[cases]
-        self.host_length[rows] = self.encounters.host_length[cases]
-        self.merging_length[rows] = self.encounters.merging_length[cases]
-        for plant in (self.plant, self.shadow):
-            plant.place(rows, self.encounters, cases)
+        self.plant.place(rows, self.encounters, cases)
+        start = self.encounters.start[:, cases]
+        self.closed_form[:, rows] = start[:2]
+        self.recorder.placed(rows, start)
         self.merging_car.reset(rows, cases)
         self.driver.estimator.reset(rows, self.encounters.label[cases], self.keys[cases])
         self.driver.controller.reset(rows)
-        self.scorer.reset(rows, cases)
+        self.watch.reset(rows, self.score_until[cases])
 
-    def _finish(self, rows: IntArray, now: Observation) -> None:
+    def _finish(self, rows: IntArray) -> None:
         cases = self.case[rows]
-        cycles = int(self.age[rows].sum())
+        apart = np.abs(self.plant.state[:2, rows] - self.closed_form[:, rows]).max()  # what came between them stays
+        self.effort.worst_difference_m = max(self.effort.worst_difference_m, float(apart))
+        self.columns["sumo_collision"][cases] = self.plant.collided[rows]
+        for case, row, cycles in zip(cases.tolist(), rows.tolist(), self.age[rows].tolist(), strict=True):
+            self.over[case] = self.recorder.track(row, cycles)
+        if len(self.over) >= SCORED_TOGETHER:
+            self._score()
+
+    def _score(self) -> None:
+        """Score the encounters that are over and forget their tracks."""
+        if not self.over:
+            return
+        tracks = Tracks.of(self.encounters, list(self.over), list(self.over.values()))
+        self.over.clear()
+        for name, values in score(tracks, self.rules, self.encounters.log).items():
+            column = self.columns.setdefault(name, np.empty(len(self.encounters), dtype=values.dtype))
+            column[tracks.case] = values
+        cycles = int(tracks.cycles.sum())
         self.effort.encounter_cycles += cycles
         self.effort.vehicle_steps += 2 * cycles
-        for ours, closed in (
-            (self.plant.host_station, self.shadow.host_station),
-            (self.plant.merging_station, self.shadow.merging_station),
-        ):  # a difference once made stays, so the end shows the largest
-            worst = float(np.abs(ours[rows] - closed[rows]).max())
-            self.effort.worst_difference_m = max(self.effort.worst_difference_m, worst)
-        self.scored[:, cases] = self.scorer.block[:, rows]
-        self.columns["end_cycle"][cases] = self.age[rows]
-        self.columns["end_station"][cases] = now.host_station[rows]
-        self.columns["end_speed"][cases] = now.host_speed[rows]
-        self.columns["end_merging_station"][cases] = now.merging_station[rows]
-        self.columns["end_merging_speed"][cases] = now.merging_speed[rows]
-        self.columns["scored_to_end"][cases] = self.scorer.scored_to_end(self.age)[rows]
 
     def _trace(self, now: Observation, log_odds: FloatArray, not_yield: BoolArray, next_speed: FloatArray) -> None:
         for row in np.flatnonzero(np.isin(self.case, list(self.traced))).tolist():

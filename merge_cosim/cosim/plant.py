@@ -10,7 +10,7 @@ import numpy as np
 
 from merge_cosim.cosim.session import Car, LibsumoSession, Session, SumoOptions
 from merge_cosim.encounter import Encounters
-from merge_cosim.ramps.ramp import Ramp, Way
+from merge_cosim.ramps.ramp import LanePosition, Ramp, Way
 from merge_cosim.ramps.tiles import tile_id, tile_net
 from merge_cosim.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
 
@@ -23,24 +23,21 @@ class Plant(Protocol):
 
     Attributes:
         count: Number of tiles.
-        host_station, host_speed, merging_station, merging_speed: The state, shape (count,) each [m, m/s].
-        colliding: Tiles in which SUMO reports a contact in the last step, shape (count,).
+        state: Stations of hosts and merging cars [m], then their speeds [m/s], shape (4, count).
+        collided: Tiles in which SUMO has reported a contact since the encounter there was placed, shape (count,).
         step_s: Time [s] spent inside SUMO's steps so far; commanding and reading the cars is not in it.
     """
 
     count: int
     step_s: float
-    host_station: FloatArray
-    host_speed: FloatArray
-    merging_station: FloatArray
-    merging_speed: FloatArray
-    colliding: BoolArray
+    state: FloatArray
+    collided: BoolArray
 
     def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
         """Put the encounters `cases` at their initial states into `tiles`."""
 
-    def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
-        """Drive all cars one cycle with the given speeds [m/s]."""
+    def advance(self, speeds: FloatArray) -> None:
+        """Drive all cars one cycle with the given speeds [m/s] of hosts and merging cars, shape (2, count)."""
 
 
 class NumpyPlant:
@@ -49,22 +46,17 @@ class NumpyPlant:
     def __init__(self, count: int) -> None:
         self.count = count
         self.step_s = 0.0
-        self.host_station, self.host_speed = np.zeros(count), np.zeros(count)
-        self.merging_station, self.merging_speed = np.zeros(count), np.zeros(count)
-        self.colliding = np.zeros(count, dtype=bool)
+        self.state = np.zeros((4, count))
+        self.collided = np.zeros(count, dtype=bool)
 
     def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
         """See `Plant`."""
-        self.host_station[tiles] = encounters.host_station[cases]
-        self.host_speed[tiles] = encounters.host_speed[cases]
-        self.merging_station[tiles] = encounters.merging_station[cases]
-        self.merging_speed[tiles] = encounters.merging_speed[cases]
+        self.state[:, tiles] = encounters.start[:4, cases]
 
-    def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
+    def advance(self, speeds: FloatArray) -> None:
         """See `Plant`."""
-        self.host_speed, self.merging_speed = host_speed, merging_speed
-        self.host_station = self.host_station + host_speed * DT
-        self.merging_station = self.merging_station + merging_speed * DT
+        self.state[2:] = speeds
+        self.state[:2] += speeds * DT
 
 
 class SumoPlant:
@@ -108,75 +100,73 @@ class SumoPlant:
             for name, row in self._row.items()
         )
         start = {section.edge: section.start for section in ramp.main + ramp.ramp}
-        self._edge_start = np.array([start[edge] for route in routes for edge in route])
+        self._starts = np.array([start[edge] for route in routes for edge in route])
         self._edge_number = [{edge: i for i, edge in enumerate(routes[0])}]
         self._edge_number += [{edge: i + len(routes[0]) for i, edge in enumerate(routes[1])}]
         self._edge = np.repeat([0, len(routes[0])], count)
+        self._edge_start = self._starts[self._edge]
         self._position = np.zeros(2 * count)
         self._merge_position = np.zeros(2 * count)
         self._length = np.full(2 * count, np.nan)
         self._in_host_lane = np.ones(count, dtype=bool)
-        self._set_state(np.zeros(2 * count), np.zeros(2 * count))
-        self.colliding = np.zeros(count, dtype=bool)
+        self.state = np.zeros((4, count))
+        self.collided = np.zeros(count, dtype=bool)
 
     def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
         """See `Plant`."""
-        self.host_station[tiles] = encounters.host_station[cases]
-        self.host_speed[tiles] = encounters.host_speed[cases]
-        self.merging_station[tiles] = encounters.merging_station[cases]
-        self.merging_speed[tiles] = encounters.merging_speed[cases]
+        start = encounters.start[:, cases]
+        self.state[:, tiles] = start[:4]
+        self.collided[tiles] = False
         self._in_host_lane[tiles] = not self.ramp.changes_lane
         merge_position = encounters.merge_position[cases]
-        paths: tuple[tuple[Way, IntArray, FloatArray, FloatArray, FloatArray], ...] = (
-            ("main", tiles, self.host_station, self.host_speed, encounters.host_length),
-            ("ramp", tiles + self.count, self.merging_station, self.merging_speed, encounters.merging_length),
-        )
-        for path, rows, station, speed, length in paths:
-            self._place(path, rows, merge_position, station[tiles], speed[tiles], length[cases])
+        paths: tuple[tuple[Way, IntArray], ...] = (("main", tiles), ("ramp", tiles + self.count))
+        for car, (path, rows) in enumerate(paths):
+            self._merge_position[rows] = merge_position
+            values = zip(rows.tolist(), merge_position.tolist(), *start[car::2].tolist(), strict=True)
+            for row, position, station, speed, length in values:
+                self._place(row, self.ramp.place(path, station, position), speed, length)
 
-    def _place(self, path: Way, rows: IntArray, *columns: FloatArray) -> None:
-        """Put cars on a path; the columns are merging position, station, speed and length."""
-        self._merge_position[rows] = columns[0]
-        values = (column.tolist() for column in (rows, *columns))
-        for row, merge_position, station, speed, length in zip(*values, strict=True):
-            name = self._names[row]
-            where = self.ramp.place(path, station, merge_position)
-            self.session.place(name, self._id(row % self.count, f"{where.edge}_{where.lane}"), where.position, speed)
-            self._edge[row] = self._edge_number[path == "ramp"][where.edge]
-            self._position[row] = where.position
-            if self._length[row] != length:
-                self.session.set_length(name, length)
-                self._length[row] = length
+    def _place(self, row: int, where: LanePosition, speed: float, length: float) -> None:
+        name = self._names[row]
+        self.session.place(name, self._id(row % self.count, f"{where.edge}_{where.lane}"), where.position, speed)
+        self._edge[row] = self._edge_number[row // self.count][where.edge]
+        self._edge_start[row] = self._starts[self._edge[row]]
+        self._position[row] = where.position
+        if self._length[row] != length:
+            self.session.set_length(name, length)
+            self._length[row] = length
 
-    def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
+    def advance(self, speeds: FloatArray) -> None:
         """See `Plant`; a merging car whose front reaches the merging point in this cycle changes lane in it."""
-        arrives = ~self._in_host_lane & (self.merging_station + merging_speed * DT >= -TOLERANCE)
-        for tile in np.flatnonzero(arrives).tolist():
-            reached = self.merging_station[tile] + merging_speed[tile] * DT
-            edge = self.ramp.place("main", max(float(reached), 0.0), float(self._merge_position[tile])).edge
-            self.session.change_lane(self._names[tile + self.count], self.ramp.host_lane_on(edge))
-        self._in_host_lane |= arrives
-        self.session.command(self._names, np.concatenate([host_speed, merging_speed]).tolist())
+        if self.ramp.changes_lane:
+            self._change_lanes(self.state[1] + speeds[1] * DT)
+        self.session.command(self._names, speeds.ravel().tolist())
         begin = perf_counter()
         self.session.step()
         self.step_s += perf_counter() - begin
         self._read()
 
+    def _change_lanes(self, reached: FloatArray) -> None:
+        """Command the lane changes of this cycle; `reached` are the merging cars' stations at its end [m]."""
+        arrives = ~self._in_host_lane & (reached >= -TOLERANCE)
+        for tile in np.flatnonzero(arrives).tolist():
+            edge = self.ramp.place("main", max(float(reached[tile]), 0.0), float(self._merge_position[tile])).edge
+            self.session.change_lane(self._names[tile + self.count], self.ramp.host_lane_on(edge))
+        self._in_host_lane |= arrives
+
     def _read(self) -> None:
         position = np.fromiter(self.session.positions(self._names), np.float64, 2 * self.count)
-        self._edge += position < self._position  # cars never back up, so a smaller position is the next edge's
+        crossed = np.flatnonzero(position < self._position)  # cars never back up, so this is the next edge's
+        if len(crossed):
+            self._edge[crossed] += 1
+            self._edge_start[crossed] = self._starts[self._edge[crossed]]
         self._position = position
-        station = position + self._edge_start[self._edge] - self._merge_position
-        self._set_state(station, (station - self._station) / DT)
-        self.colliding = np.zeros(self.count, dtype=bool)
+        station = (position + self._edge_start - self._merge_position).reshape(2, self.count)
+        np.subtract(station, self.state[:2], out=self.state[2:])
+        self.state[2:] /= DT
+        self.state[:2] = station
         for name in self._row.keys() & self.session.colliding():
-            self.colliding[self._row[name] % self.count] = True
-
-    def _set_state(self, station: FloatArray, speed: FloatArray) -> None:
-        """Take over the state of all hosts, then all merging cars; the public arrays are views of it."""
-        self._station = station
-        self.host_station, self.merging_station = station[: self.count], station[self.count :]
-        self.host_speed, self.merging_speed = speed[: self.count], speed[self.count :]
+            self.collided[self._row[name] % self.count] = True
 
     def close(self) -> None:
         """End the simulation."""

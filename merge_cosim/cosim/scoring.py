@@ -1,4 +1,4 @@
-"""Scoring: what happened in each encounter, kept as arrays over the batch and updated once per cycle."""
+"""Scoring: when an encounter is over; then failure, the bumpers' crossings, gaps, time to collision, braking, jerk."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from typing import Literal
 import numpy as np
 from pydantic import PositiveFloat
 
-from merge_cosim.cosim.decisions import DECISIONS, Decisions
-from merge_cosim.cosim.likeness import LIKENESS, Likeness
-from merge_cosim.encounter import ReplayLog
+from merge_cosim.cosim.decisions import decisions
+from merge_cosim.cosim.likeness import likeness
+from merge_cosim.cosim.tracks import Tracks
+from merge_cosim.encounter import NEVER, Encounters, ReplayLog
 from merge_cosim.observation import Observation
-from merge_cosim.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
+from merge_cosim.units import DT, TOLERANCE, AnyArray, BoolArray, FloatArray, IntArray
 
 KINDS = ("", "side", "host_into_merging", "merging_into_host", "host_into_leader")
 SIDE, HOST_INTO_MERGING, MERGING_INTO_HOST, HOST_INTO_LEADER = 1, 2, 3, 4
 GOAL = 50.0
 """Station [m] at which the delay is taken."""
-CROSSINGS = ("host_reached_s", "host_cleared_s", "goal_s", "merging_reached_s", "merging_cleared_s")
-"""Times, interpolated, at which the front or (cleared) the rear bumper passes station 0, or the host's front `GOAL`."""
+USUAL_ACCELERATION = 1.0
+"""Acceleration [m/s^2] by which the length of a case is guessed."""
 
 
 @dataclass(frozen=True)
@@ -36,133 +37,155 @@ class Rules:
     time_out: PositiveFloat = 40.0
     overlap_from: Literal["both", "lane_change"] = "both"
 
+    @property
+    def horizon_cycles(self) -> int:
+        """Cycles of the horizon."""
+        return round(self.horizon / DT)
 
-_SCORES = {
-    "kind": 0.0,
-    "scored_from": -1.0,
-    "distance_m": np.nan,
-    "gap_m": np.nan,
-    "min_gap_m": np.inf,
-    "min_ttc_s": np.inf,
-    "max_drac": 0.0,
-    "hardest_braking": 0.0,
-    "jerk_sum": 0.0,
-    "sumo_collision": 0.0,
-    **dict.fromkeys(CROSSINGS, np.nan),
-}
-_EMPTY = _SCORES | DECISIONS | LIKENESS
+    @property
+    def time_out_cycles(self) -> int:
+        """Cycles of the longest run."""
+        return round(self.time_out / DT)
+
+    def begun(self, now: Observation) -> BoolArray:
+        """Where the cars stand so that scoring begins."""
+        if self.overlap_from == "both":
+            return np.minimum(now.host_station, now.merging_station) >= -TOLERANCE
+        return now.merging_in_lane
 
 
-class Scorer:
-    """Scores a batch.
+def expected_cycles(encounters: Encounters, rules: Rules) -> FloatArray:
+    """Rough length of each case: both cars accelerate to the merging point, then it is scored; shape (n,)."""
+    arrivals = [
+        (np.sqrt(speed**2 + 2 * USUAL_ACCELERATION * np.maximum(-station, 0.0)) - speed) / USUAL_ACCELERATION
+        for station, speed in (
+            (encounters.host_station, encounters.host_speed),
+            (encounters.merging_station, encounters.merging_speed),
+        )
+    ]
+    expected: FloatArray = np.minimum(np.maximum(*arrivals) + rules.horizon, rules.time_out) / DT
+    return expected
 
-    Bodies are `[s - L, s]`; they overlap when they share more than the tolerance. Missing values are NaN. All measures
-    lie in one block, so that encounters are begun and read off in one operation. Decisions are kept by `Decisions`, the
-    difference to a logged host by `Likeness`.
 
-    Attributes:
-        block: All measures, shape (len(columns), count).
-        columns: Each measure by name, shape (count,): a view of the block.
-    """
+class Watch:
+    """Tells, cycle by cycle, which encounters of a batch are over: this alone must be known at once."""
 
-    def __init__(self, count: int, rules: Rules, log: ReplayLog | None = None) -> None:
+    def __init__(self, count: int, rules: Rules) -> None:
         self._rules = rules
-        self._horizon = round(rules.horizon / DT)
-        self._time_out = round(rules.time_out / DT)
-        self._empty = np.array(list(_EMPTY.values()))[:, None]
-        self.block = np.repeat(self._empty, count, axis=1)
-        self.columns: dict[str, FloatArray] = dict(zip(_EMPTY, self.block, strict=True))
-        own, decided = len(_SCORES), len(DECISIONS)
-        self._times = self.block[own - len(CROSSINGS) : own]
-        self._decisions = Decisions(self.block[own : own + decided])
-        self._likeness = Likeness(self.block[own + decided :], log)
-        self._lines, self._past = np.full_like(self._times, np.inf), np.zeros_like(self._times, dtype=bool)
-        self._braking = np.zeros(count)
-        self._begun: list[IntArray] = []
+        self._horizon, self._time_out = rules.horizon_cycles, rules.time_out_cycles
+        self._until = np.full(count, NEVER)
+        self._scored = np.zeros(count, dtype=bool)
 
-    def reset(self, rows: IntArray, cases: IntArray) -> None:
-        """Begin the encounters `cases` anew at `rows`."""
-        self.block[:, rows] = self._empty
-        self._begun.append(rows)
-        self._decisions.reset(rows)
-        self._likeness.reset(rows, cases)
+    def reset(self, rows: IntArray, limit: IntArray) -> None:
+        """Begin anew at `rows`, each to be scored until cycle `limit` at most."""
+        self._until[rows] = np.minimum(limit, self._time_out)
+        self._scored[rows] = False
 
-    def decided(self, age: IntArray, now: Observation, log_odds: FloatArray, not_yield: BoolArray) -> None:
-        """Take in belief and decision of the present cycle; see `Decisions`."""
-        self._decisions.decided(age, now, log_odds, not_yield)
+    def over(self, age: IntArray, now: Observation) -> BoolArray:
+        """Where an encounter has failed, its horizon has been seen, or its time is up; `age` is the cycle of `now`."""
+        begins = self._rules.begun(now) > self._scored
+        if np.count_nonzero(begins):
+            self._scored[begins] = True
+            self._until[begins] = np.minimum(self._until[begins], age[begins] + self._horizon)
+        return (age >= self._until) | (self._scored & (now.gap < -TOLERANCE))
 
-    def moved(self, age: IntArray, before: Observation, now: Observation, colliding: BoolArray) -> BoolArray:
-        """Take in one cycle's motion; `age` is the cycle of `now`. Returns where scoring or time is over."""
-        if self._begun:
-            self._begin(np.concatenate(self._begun), before, now)
-        self._take_crossings(age, before, now)
-        braking = (before.host_speed - now.host_speed) / DT
-        self._likeness.moved(age, now)
-        c = self.columns
-        np.maximum(c["hardest_braking"], braking, out=c["hardest_braking"])
-        c["jerk_sum"] += np.abs(braking - self._braking)
-        self._braking = braking
-        np.maximum(c["sumo_collision"], colliding, out=c["sumo_collision"])
-        past = now.merging_station >= -TOLERANCE
-        if self._rules.overlap_from == "both":
-            past &= now.host_station >= -TOLERANCE
-        np.copyto(c["scored_from"], age, where=(c["scored_from"] < 0) & past)
-        self._take_gaps(age, now, c["scored_from"] >= 0)
-        return (c["kind"] > 0) | self.scored_to_end(age) | (age >= self._time_out)
 
-    def scored_to_end(self, age: IntArray) -> BoolArray:
-        """Where the whole horizon has been seen."""
-        start = self.columns["scored_from"]
-        return (start >= 0) & (age >= start + self._horizon)
+def ends(tracks: Tracks, rules: Rules) -> IntArray:
+    """The cycles in which encounters were over that were recorded beyond that, by the rules of `Watch`; shape (m,)."""
+    start = tracks.reached(rules.begun(tracks.states) & (tracks.age > 0))
+    scored = tracks.age >= start[tracks.encounter]
+    failed = tracks.reached(scored & (tracks.states.gap < -TOLERANCE))
+    longest = np.minimum(tracks.cycles, rules.time_out_cycles)
+    return np.minimum(np.minimum(start + rules.horizon_cycles, failed), longest)
 
-    def _begin(self, rows: IntArray, before: Observation, now: Observation) -> None:
-        """Set up what needs the first two states of the encounters at `rows`."""
-        self._begun.clear()
-        nothing = np.zeros(len(rows))
-        lines = (nothing, before.host_length[rows], nothing + GOAL, nothing, before.merging_length[rows])
-        self._lines[:, rows] = np.array(lines) - TOLERANCE
-        self._past[:3, rows] = before.host_station[rows] >= self._lines[:3, rows]
-        self._past[3:, rows] = before.merging_station[rows] >= self._lines[3:, rows]
-        self._braking[rows] = (before.host_speed[rows] - now.host_speed[rows]) / DT  # no jerk before the second cycle
 
-    def _take_crossings(self, age: IntArray, before: Observation, now: Observation) -> None:
-        self._past, past = np.empty_like(self._past), self._past
-        np.greater_equal(now.host_station, self._lines[:3], out=self._past[:3])
-        np.greater_equal(now.merging_station, self._lines[3:], out=self._past[3:])
-        line, rows = np.nonzero(self._past > past)
-        if not len(rows):
-            return
-        of_host = line < 3
-        old = np.where(of_host, before.host_station[rows], before.merging_station[rows])
-        new = np.where(of_host, now.host_station[rows], now.merging_station[rows])
-        part = (self._lines[line, rows] + TOLERANCE - old) / (new - old)
+def score(tracks: Tracks, rules: Rules, log: ReplayLog | None = None) -> dict[str, AnyArray]:
+    """All measures of some encounters that are over, and their last states; shape (m,) each, missing values NaN.
+
+    Bodies are `[s - L, s]`; they overlap when they share more than the tolerance. Crossings (`host_reached_s`,
+    `host_cleared_s`, `goal_s`, `merging_reached_s`, `merging_cleared_s`) are the times, interpolated, at which the
+    front or (cleared) the rear bumper passes station 0, or the host's front `GOAL`.
+    """
+    states, last = tracks.states, tracks.last
+    return {
+        "end_cycle": tracks.cycles,
+        "end_station": states.host_station[last],
+        "end_speed": states.host_speed[last],
+        "end_merging_station": states.merging_station[last],
+        "end_merging_speed": states.merging_speed[last],
+        **_gaps(tracks, rules),
+        **_crossings(tracks),
+        **_braking(tracks),
+        **decisions(tracks),
+        **likeness(tracks, log),
+    }
+
+
+def _braking(tracks: Tracks) -> dict[str, FloatArray]:
+    """Hardest braking [m/s^2], and the sum over the cycles, from the second one on, by how much it changed."""
+    speed = tracks.states.host_speed
+    braking, change = np.zeros_like(speed), np.zeros_like(speed)
+    braking[1:] = (speed[:-1] - speed[1:]) / DT
+    braking[tracks.first] = 0.0
+    change[1:] = np.abs(braking[1:] - braking[:-1])
+    change[tracks.first], change[tracks.first + 1] = 0.0, 0.0
+    return {
+        "hardest_braking": np.maximum.reduceat(braking, tracks.first),
+        "jerk_sum": np.bincount(tracks.encounter, change),  # one after the other, so what else is scored changes no bit
+    }
+
+
+def _crossings(tracks: Tracks) -> dict[str, FloatArray]:
+    """When bumpers pass the lines, and where the merging car is when the host arrives."""
+    states = tracks.states
+    host, merging = states.host_station, states.merging_station
+    found = {name: tracks.fill(np.nan) for name in ("distance_m", "gap_m")}
+    for name, station, line in (
+        ("host_reached_s", host, 0.0),
+        ("host_cleared_s", host, states.host_length),
+        ("goal_s", host, GOAL),
+        ("merging_reached_s", merging, 0.0),
+        ("merging_cleared_s", merging, states.merging_length),
+    ):
+        edge = np.broadcast_to(line - TOLERANCE, station.shape)
+        reached = tracks.reached(station >= edge)
+        crossing = np.flatnonzero((reached > 0) & (reached <= tracks.cycles))
+        after = tracks.first[crossing] + reached[crossing]
+        before = after - 1
+        part = (edge[after] + TOLERANCE - station[before]) / (station[after] - station[before])
         part = np.minimum(np.maximum(part, 0.0), 1.0)
-        self._times[line, rows] = (age[rows] - 1 + part) * DT
-        host = line == 0
-        if host.any():
-            rows, part = rows[host], part[host]
-            start = before.merging_station[rows]
-            other = start + part * (now.merging_station[rows] - start)
-            leader_length = np.where(other >= -TOLERANCE, now.merging_length[rows], now.host_length[rows])
-            self.columns["distance_m"][rows] = np.abs(other)
-            self.columns["gap_m"][rows] = np.abs(other) - leader_length
+        found[name] = tracks.fill(np.nan)
+        found[name][crossing] = (reached[crossing] - 1 + part) * DT
+        if name == "host_reached_s":
+            other = merging[before] + part * (merging[after] - merging[before])
+            leader_length = np.where(other >= -TOLERANCE, states.merging_length[after], states.host_length[after])
+            found["distance_m"][crossing] = np.abs(other)
+            found["gap_m"][crossing] = np.abs(other) - leader_length
+    return found
 
-    def _take_gaps(self, age: IntArray, now: Observation, scored: BoolArray) -> None:
-        if not scored.any():
-            return
-        c = self.columns
-        host_follows = now.merging_ahead
-        lead = np.abs(now.merging_station - now.host_station)
-        gap = lead - np.where(host_follows, now.merging_length, now.host_length)
-        closing = np.where(host_follows, 1.0, -1.0) * (now.host_speed - now.merging_speed)
-        np.copyto(c["min_gap_m"], np.minimum(c["min_gap_m"], gap), where=scored)
-        rows = np.flatnonzero(scored & (closing > 0))
-        if len(rows):
-            near, fast = np.maximum(gap[rows], 0.0), closing[rows]
-            c["min_ttc_s"][rows] = np.minimum(c["min_ttc_s"][rows], near / fast)
-            drac = np.divide(fast * fast, 2.0 * near, out=np.zeros_like(near), where=near > TOLERANCE)
-            c["max_drac"][rows] = np.maximum(c["max_drac"][rows], drac)
-        rows = np.flatnonzero(scored & (gap < -TOLERANCE) & (c["kind"] == 0))
-        if len(rows):
-            later = np.where(host_follows[rows], HOST_INTO_MERGING, MERGING_INTO_HOST)
-            c["kind"][rows] = np.where(age[rows] == c["scored_from"][rows], SIDE, later)
+
+def _gaps(tracks: Tracks, rules: Rules) -> dict[str, AnyArray]:
+    """What is scored: from when on, the smallest gap and time to collision, the largest DRAC, and the failure."""
+    states, encounter, age = tracks.states, tracks.encounter, tracks.age
+    start = tracks.reached(rules.begun(states) & (age > 0))
+    scored = np.flatnonzero(age >= start[encounter])
+    gap, follows = states.gap[scored], states.merging_ahead[scored]
+    closing = np.where(follows, 1.0, -1.0) * (states.host_speed - states.merging_speed)[scored]
+    min_gap, min_ttc, max_drac = tracks.fill(np.inf), tracks.fill(np.inf), tracks.fill(0.0)
+    np.minimum.at(min_gap, encounter[scored], gap)
+    closer = closing > 0
+    near, fast, whose = np.maximum(gap[closer], 0.0), closing[closer], encounter[scored[closer]]
+    np.minimum.at(min_ttc, whose, near / fast)
+    drac = np.divide(fast * fast, 2.0 * near, out=np.zeros_like(near), where=near > TOLERANCE)
+    np.maximum.at(max_drac, whose, drac)
+    later = np.where(states.merging_ahead[tracks.last], HOST_INTO_MERGING, MERGING_INTO_HOST)
+    kind = np.where(tracks.cycles == start, SIDE, later)
+    began = start <= tracks.cycles
+    return {
+        "kind": np.where(began & (states.gap[tracks.last] < -TOLERANCE), kind, 0),
+        "scored_from": np.where(began, start, -1),
+        "scored_to_end": tracks.cycles >= start + rules.horizon_cycles,
+        "min_gap_m": min_gap,
+        "min_ttc_s": min_ttc,
+        "max_drac": max_drac,
+    }

@@ -1,7 +1,7 @@
 """What any host could have done against a log: pass without a failure at all, and how soon.
 
 Feasibility: full braking keeps the smallest station in every cycle, full throttle up to the limit the largest; if both
-fail, no host passes behind or ahead. It is decided by the loop and the scorer themselves, in the closed form. Smallest
+fail, no host passes behind or ahead. It is decided by the loop and its scoring themselves, in the closed form. Smallest
 delay: ahead of the merging car nothing is sooner than full throttle; behind it see `soonest`. A delay is rounded up to
 the next whole cycle where the host passes behind.
 """

@@ -7,12 +7,14 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
 import pyarrow as pa
 
+import merge_cosim
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.executors import Finished
@@ -38,13 +40,13 @@ class Kit:
     """What a worker elsewhere needs beside the task, which carries cases, scenario, method and model.
 
     Attributes:
-        versions: What this process runs; a worker that runs anything else is refused.
+        software: What this process runs; a worker that runs anything else is refused.
         ramp: Files of the ramp by name.
         ramp_name: Its name.
         plugins: Files with the user's own components by name.
     """
 
-    versions: Mapping[str, str]
+    software: Mapping[str, str]
     ramp: Mapping[str, bytes]
     ramp_name: str
     plugins: Mapping[str, bytes]
@@ -119,15 +121,15 @@ class Cluster:
         for worker, threads in client.nthreads().items():
             if threads != 1:
                 raise UserError(f"--dask {self._address}: worker {worker} has {threads} threads; {ONE_THREAD}")
-        for worker, theirs in client.run(versions, on_error="return").items():
+        for worker, theirs in client.run(software, on_error="return").items():
             if isinstance(theirs, BaseException):
                 raise UserError(f"--dask {self._address}: worker {worker} cannot run merge-cosim: {theirs!r}")
-            _compare(theirs, versions(), f"worker {worker}")
+            _compare(theirs, software(), f"worker {worker}")
 
     def _kit(self, ramp: str) -> Kit:
         folder = find_ramp(ramp)
         files = (folder / FILE_NAME, Ramp.load(ramp).net)
-        return Kit(versions(), {file.name: file.read_bytes() for file in files}, folder.resolve().name, self._plugins)
+        return Kit(software(), {file.name: file.read_bytes() for file in files}, folder.resolve().name, self._plugins)
 
     def _result(self, future: Any, piece: Piece) -> tuple[pa.Table, Effort]:
         try:
@@ -137,10 +139,18 @@ class Cluster:
         return rows, effort
 
 
+@cache
+def software() -> Mapping[str, str]:
+    """Versions of what results depend on, and a digest of this package's source: two checkouts may bear one version."""
+    folder = Path(merge_cosim.__file__).parent
+    source = {file.relative_to(folder).as_posix(): file.read_bytes() for file in folder.rglob("*.py")}
+    return versions() | {"merge-cosim's source": _digest(source)}
+
+
 def _compare(theirs: Mapping[str, str], ours: Mapping[str, str], who: str) -> None:
     wrong = [f"{name} {theirs.get(name)} instead of {ours[name]}" for name in ours if theirs.get(name) != ours[name]]
     if wrong:
-        raise UserError(f"--dask: {who} has {', '.join(wrong)}; rows would not be the same, install the same versions")
+        raise UserError(f"--dask: {who} has {', '.join(wrong)}; rows would not be the same, install the same there")
 
 
 _at_work = threading.Lock()
@@ -158,7 +168,7 @@ def run_shipped(task: Task, kit: Kit) -> tuple[pa.Table, Effort]:
     if not _at_work.acquire(blocking=False):
         raise UserError(f"--dask: a worker runs several tasks at a time; {ONE_THREAD}")
     try:
-        _compare(versions(), kit.versions, "a worker")
+        _compare(software(), kit.software, "a worker")
         for name, content in kit.plugins.items():
             _load_shipped(name, content)
         ramp = _unpack("ramps", kit.ramp, kit.ramp_name)
@@ -181,9 +191,13 @@ def _load_shipped(name: str, content: bytes) -> None:
 
 def _unpack(kind: str, files: Mapping[str, bytes], name: str) -> Path:
     """Write files that came along into a folder of the cache that is named by their content."""
-    digest = hashlib.sha256(b"".join(key.encode() + content for key, content in sorted(files.items()))).hexdigest()[:16]
-    folder = cache_folder("shipped", kind, digest, name)
+    folder = cache_folder("shipped", kind, _digest(files), name)
     for key, content in files.items():
         if not (folder / key).is_file():
             write_atomically(folder / key, content)
     return folder
+
+
+def _digest(files: Mapping[str, bytes]) -> str:
+    """A short hash of files by name."""
+    return hashlib.sha256(b"".join(key.encode() + content for key, content in sorted(files.items()))).hexdigest()[:16]

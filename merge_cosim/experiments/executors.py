@@ -11,16 +11,18 @@ from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import BaseContext
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import pyarrow as pa
 
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.pieces import Handout, Piece
-from merge_cosim.experiments.plan import StartMethod, SweepRequest
 from merge_cosim.experiments.work import Workplace
 from merge_cosim.registry import load_plugin
+
+if TYPE_CHECKING:  # a worker process plans nothing, and need not import what planning needs
+    from merge_cosim.experiments.plan import StartMethod, SweepRequest
 
 MOST_LOSSES = 3
 """Workers that one piece may lose before the sweep gives up on it."""

@@ -56,8 +56,8 @@ class _LoggedHosts(NumpyPlant):
         self._driver.reset(tiles, cases)
         self._age[tiles] = 0
 
-    def advance(self, host_speed: FloatArray, merging_speed: FloatArray) -> None:
-        super().advance(self._driver.speed(self._age), merging_speed)
+    def advance(self, speeds: FloatArray) -> None:
+        super().advance(np.array([self._driver.speed(self._age), speeds[1]]))
         self._age += 1
 
 

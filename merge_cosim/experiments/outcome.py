@@ -1,4 +1,4 @@
-"""From the scorer's measures to result rows: one per (scenario, case, method), with a fixed schema."""
+"""From the measures of a run to result rows: one per (scenario, case, method), with a fixed schema."""
 
 from __future__ import annotations
 

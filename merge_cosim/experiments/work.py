@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numpy as np
 import pyarrow as pa
 
 from merge_cosim.control.acc import Acc
 from merge_cosim.control.base import controllers
 from merge_cosim.cosim.loop import Effort, Run, simulate
 from merge_cosim.cosim.plant import Plant, SumoPlant
+from merge_cosim.cosim.scoring import expected_cycles
 from merge_cosim.encounter import Encounters
 from merge_cosim.experiments.human import simulate_human
 from merge_cosim.experiments.methods import Method
@@ -22,17 +22,15 @@ from merge_cosim.experiments.scenario import Scenario
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.units import DT, FloatArray
+from merge_cosim.units import FloatArray
 
-TILES = 160
-"""Encounters side by side in one SUMO. Fewer spread the cost of a cycle's Python over fewer cars; with more than about
-190 SUMO's own step costs more per car, as its cars no longer fit the processor's cache."""
+TILES = 192
+"""Encounters side by side in one SUMO. From 128 to 208 tiles a case costs the same: more of them spread the cost of a
+cycle's Python over more cars, but SUMO's own step costs more per car, as more cars fit its cache less well."""
 
 PIECE_CASES = 1_000
 """Most encounters that are handed out at a time: enough to keep the tiles busy, few enough to lose little when
 interrupted."""
-USUAL_ACCELERATION = 1.0
-"""Acceleration [m/s^2] by which the length of a case is guessed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,17 +117,8 @@ class Batch(Task):
         return replace(self, encounters=self.encounters.part(first, last), left_out=())
 
     def cycles(self) -> FloatArray:
-        """Rough length of each case: both cars accelerate to the merging point, then it is scored."""
-        encounters, rules = self.encounters, self.scenario.test
-        arrivals = [
-            (np.sqrt(speed**2 + 2 * USUAL_ACCELERATION * np.maximum(-station, 0.0)) - speed) / USUAL_ACCELERATION
-            for station, speed in (
-                (encounters.host_station, encounters.host_speed),
-                (encounters.merging_station, encounters.merging_speed),
-            )
-        ]
-        expected: FloatArray = np.minimum(np.maximum(*arrivals) + rules.horizon, rules.time_out) / DT
-        return expected
+        """Expected cycles of each case; see `expected_cycles`."""
+        return expected_cycles(self.encounters, self.scenario.test)
 
     def digest(self) -> str:
         """A short hash of the encounters."""

@@ -35,5 +35,5 @@ def test_the_end_of_sumo_in_mid_run_is_told():
         running.kill()
         running.wait()
     with pytest.raises(UserError, match="SUMO has ended before the case was over"), connection_kept():
-        plant.advance(np.zeros(1), np.zeros(1))
+        plant.advance(np.zeros((2, 1)))
     plant.close()

@@ -58,8 +58,8 @@ def test_speeds_are_those_that_sumo_reports(ramp, merge_position):
         for _ in range(2):  # the second time the cars come from where the first encounters ended
             plant.place(np.arange(16), encounters, np.arange(16))
             for _ in range(120):  # across edges and the lane change
-                plant.advance(rng.uniform(0, 30, 16), rng.uniform(0, 30, 16))
-                for role, speeds in (("host", plant.host_speed), ("merging", plant.merging_speed)):
+                plant.advance(rng.uniform(0, 30, (2, 16)))
+                for role, speeds in zip(("host", "merging"), plant.state[2:], strict=True):
                     reported = [libsumo.vehicle.getSpeed(f"t{tile}.{role}") for tile in range(16)]
                     np.testing.assert_allclose(speeds, reported, atol=1e-9)
     finally:

@@ -3,14 +3,18 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from command import merge_cosim, small_scenario
+
+import merge_cosim as merge_cosim_package
 
 pytest.importorskip("distributed", reason="dask.distributed is an extra: pip install 'merge-cosim[dask]'")
 
@@ -31,16 +35,16 @@ class Shipped(Estimator):
 
 
 @contextmanager
-def cluster(folder, workers=2, threads=1):
+def cluster(folder, workers=2, threads=1, **environment):
     """A scheduler and worker processes without nannies, which would start a killed worker anew."""
     folder.mkdir()
     started = []
+    here = os.environ | {"MERGE_COSIM_CACHE": str(folder / "cache")}
 
     def start(*words):
-        environment = os.environ | {"MERGE_COSIM_CACHE": str(folder / "cache")}
         log = (folder / f"{len(started)}.log").open("w")
         command = [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]]
-        process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=environment)
+        process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=here | environment)
         started.append(process)
         return process, folder / f"{len(started) - 1}.log"
 
@@ -97,6 +101,19 @@ def test_workers_with_several_threads_are_refused(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path):
+    other = tmp_path / "other" / "merge_cosim"
+    shutil.copytree(Path(merge_cosim_package.__file__).parent, other, ignore=shutil.ignore_patterns("__pycache__"))
+    with (other / "units.py").open("a") as file:
+        file.write("# edited\n")
+    with cluster(tmp_path / "cluster", workers=1, PYTHONPATH=str(other.parent)) as (address, _):
+        done = merge_cosim("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", address, cwd=tmp_path)
+    assert done.returncode == 2
+    assert re.search(r"worker \S+ has merge-cosim's source [0-9a-f]{16} instead of [0-9a-f]{16}", done.stderr)
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.slow
 def test_a_local_cluster_gives_the_same_bytes(tmp_path):
     scenario = small_scenario(tmp_path)
     for out, where in (("here", ()), ("there", ("--dask", "local"))):
@@ -124,11 +141,11 @@ def test_without_dask_installed_there_is_one_line(tmp_path):
 
 def test_other_versions_are_refused():
     from merge_cosim.errors import UserError
-    from merge_cosim.experiments.cluster import Kit, run_shipped
+    from merge_cosim.experiments.cluster import Kit, run_shipped, software
     from merge_cosim.experiments.pieces import cut
-    from merge_cosim.experiments.plan import SweepRequest, plan, versions
+    from merge_cosim.experiments.plan import SweepRequest, plan
 
     batch = next(cut(plan(SweepRequest(["designed-random"], ["acc"])))).task()
-    kit = Kit(versions() | {"libsumo": "0.1"}, {}, "designed", {})
+    kit = Kit(software() | {"libsumo": "0.1"}, {}, "designed", {})
     with pytest.raises(UserError, match=r"libsumo .* instead of 0\.1"):
         run_shipped(batch, kit)

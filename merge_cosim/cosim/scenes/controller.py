@@ -161,7 +161,7 @@ class HostController:
         for row, meeting in self._open.items():
             host, merging = meeting.host, meeting.merging
             touching = host.name in contact and merging.name in contact
-            state = (host.x, host.speed, merging.x, merging.speed, log_odds[row], log_odds[row] >= 0.0)
+            state = (host.x, host.speed, merging.x, merging.speed, log_odds[row])
             meeting.states.append(np.array([*state, *ahead[host.name], behind[host.name], touching]))
             meeting.stopped |= meeting.merged_at < 0 and merging.speed < STANDING
 

@@ -65,6 +65,6 @@ class Meeting:
 
 RECORDED = (
     *("host_x", "host_speed", "merging_x", "merging_speed"),
-    *("log_odds", "not_yield", "leader_gap", "leader_speed", "follower_gap", "contact"),
+    *("log_odds", "leader_gap", "leader_speed", "follower_gap", "contact"),
 )
 """What is recorded of a meeting in every cycle; gaps are bumper to bumper, inf without a car [m, m/s]."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from merge_cosim.cosim.loop import DECIMALS
 from merge_cosim.cosim.scenes.lanes import Part, RampLane, RampLanes
 from merge_cosim.cosim.session import LANE_CHANGE_MODE_NONE, SPEED_MODE_UNCHECKED
+from merge_cosim.cosim.tracks import DECIMALS
 from merge_cosim.ramps.routes import ROLE
 
 

@@ -8,10 +8,11 @@ import numpy as np
 
 from merge_cosim.cosim.loop import Effort, Run
 from merge_cosim.cosim.scenes.meetings import RECORDED, Ending, Meeting
-from merge_cosim.cosim.scoring import HOST_INTO_LEADER, Rules, Scorer
+from merge_cosim.cosim.scoring import HOST_INTO_LEADER, Rules, ends
+from merge_cosim.cosim.scoring import score as score_tracks
+from merge_cosim.cosim.tracks import Tracks
 from merge_cosim.encounter import Encounters, Intention
-from merge_cosim.observation import Observation
-from merge_cosim.units import TOLERANCE, AnyArray, FloatArray
+from merge_cosim.units import TOLERANCE, FloatArray
 
 LEAST_STATES = 2
 """A meeting that is to be scored has been seen to move."""
@@ -55,69 +56,43 @@ def encounters_of(meetings: Sequence[Meeting], scene: str, site: str, source: st
 
 
 def score(meetings: Sequence[Meeting], encounters: Encounters, rules: Rules) -> tuple[Run, dict[str, FloatArray]]:
-    """Score meetings by the scorer of the pair tests.
+    """Score meetings by the rules and measures of the pair tests.
 
     Returns:
         The run, and `min_leader_gap_m`, `min_leader_ttc_s`, `min_follower_gap_m` (inf without such a car), shape (n,).
     """
-    n = len(meetings)
-    last = np.array([len(meeting.states) - 1 for meeting in meetings], dtype=np.int64)
-    states = np.zeros((int(last.max(initial=0)) + 1, len(RECORDED), n))
-    for row, meeting in enumerate(meetings):
-        states[: last[row] + 1, :, row] = meeting.states
-        states[last[row] + 1 :, :, row] = meeting.states[-1]
-    scorer = Scorer(n, rules)
-    scorer.reset(np.arange(n), np.arange(n))
-    columns: dict[str, AnyArray] = {name: np.zeros(n) for name in scorer.columns}
-    columns |= {"end_cycle": last.copy(), "scored_to_end": np.zeros(n, dtype=bool)}
-    running = np.ones(n, dtype=bool)
-    for cycle in range(len(states) - 1):
-        now, after = (_observation(states[one], encounters) for one in (cycle, cycle + 1))
-        age = np.full(n, cycle)
-        scorer.decided(age, now, _of(states[cycle], "log_odds"), _of(states[cycle], "not_yield") > 0)
-        over = scorer.moved(age + 1, now, after, _of(states[cycle + 1], "contact") > 0)
-        ends = np.flatnonzero(running & (over | (cycle + 1 == last)))
-        for name, values in scorer.columns.items():
-            columns[name][ends] = values[ends]
-        columns["end_cycle"][ends] = cycle + 1
-        columns["scored_to_end"][ends] = scorer.scored_to_end(age + 1)[ends]
-        running[ends] = False
-    at_end = states[columns["end_cycle"], :, np.arange(n)].T.reshape(len(RECORDED), n)
-    ends_with = ("end_station", "end_speed", "end_merging_station", "end_merging_speed")
-    for name, value in zip(ends_with, at_end[:4], strict=True):
-        columns[name] = value - encounters.merge_position if name.endswith("station") else value
-    others = _others(states, columns["end_cycle"])
+    recorded = [np.array(meeting.states).T for meeting in meetings]
+    tracks = _tracks(recorded, encounters)
+    cycles = ends(tracks, rules)
+    recorded = [states[:, : end + 1] for states, end in zip(recorded, cycles.tolist(), strict=True)]
+    columns = score_tracks(tracks.until(cycles), rules)
+    columns["sumo_collision"] = np.array([_of(states, "contact")[1:].max() for states in recorded], dtype=bool)
+    others = {
+        "min_leader_gap_m": np.array([_of(states, "leader_gap").min() for states in recorded], dtype=float),
+        "min_leader_ttc_s": np.array([_leader_ttc(states) for states in recorded], dtype=float),
+        "min_follower_gap_m": np.array([_of(states, "follower_gap").min() for states in recorded], dtype=float),
+    }
     hit = (columns["kind"] == 0) & (others["min_leader_gap_m"] < -TOLERANCE)
     columns["kind"][hit] = HOST_INTO_LEADER
     return Run(columns, Effort()), others
 
 
-def _of(state: FloatArray, name: str) -> FloatArray:
-    return state[RECORDED.index(name)]
+def _tracks(recorded: Sequence[FloatArray], encounters: Encounters) -> Tracks:
+    """The meetings with their stations, which are known only now that their merging points are."""
+    tracks = []
+    for states, merge_position in zip(recorded, encounters.merge_position, strict=True):
+        host, merging = _of(states, "host_x") - merge_position, _of(states, "merging_x") - merge_position
+        speeds = _of(states, "host_speed"), _of(states, "merging_speed")
+        tracks.append(np.array([host, merging, *speeds, _of(states, "log_odds")]))
+    return Tracks.of(encounters, range(len(tracks)), tracks)
 
 
-def _observation(state: FloatArray, encounters: Encounters) -> Observation:
-    host_x, host_speed, merging_x, merging_speed = state[:4]
-    merge_position = encounters.merge_position
-    return Observation(
-        host_x - merge_position,
-        host_speed,
-        merging_x - merge_position,
-        merging_speed,
-        encounters.host_length,
-        encounters.merging_length,
-    )
+def _of(states: FloatArray, name: str) -> FloatArray:
+    return states[RECORDED.index(name)]
 
 
-def _others(states: FloatArray, end: AnyArray) -> dict[str, FloatArray]:
-    """Smallest gaps to the cars ahead and behind in the host lane, and the time to collision with the one ahead."""
-    counted = np.arange(len(states))[:, None] <= end
-    leader, follower = states[:, RECORDED.index("leader_gap")], states[:, RECORDED.index("follower_gap")]
-    closing = states[:, RECORDED.index("host_speed")] - states[:, RECORDED.index("leader_speed")]
-    near = counted & np.isfinite(leader) & (closing > 0)
-    time = np.divide(np.maximum(leader, 0.0), closing, out=np.full_like(leader, np.inf), where=near)
-    return {
-        "min_leader_gap_m": np.where(counted, leader, np.inf).min(axis=0),
-        "min_leader_ttc_s": time.min(axis=0),
-        "min_follower_gap_m": np.where(counted, follower, np.inf).min(axis=0),
-    }
+def _leader_ttc(states: FloatArray) -> float:
+    """Smallest time to collision with the car ahead in the host lane [s]; inf if the host never closed in on one."""
+    leader, closing = _of(states, "leader_gap"), _of(states, "host_speed") - _of(states, "leader_speed")
+    near = np.isfinite(leader) & (closing > 0)
+    return float(np.min(np.maximum(leader[near], 0.0) / closing[near], initial=np.inf))
