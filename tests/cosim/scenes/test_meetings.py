@@ -22,7 +22,7 @@ NO_LEADER = (np.inf, 0.0, np.inf, 0.0)
 
 def as_meeting(encounters, row, trace, columns):
     """What a scene would have recorded of an encounter of the pair test."""
-    names = ("host_station_m", "host_speed_m_s", "merging_station_m", "merging_speed_m_s", "log_odds", "not_yield")
+    names = ("host_station_m", "host_speed_m_s", "merging_station_m", "merging_speed_m_s", "log_odds")
     seen = np.array([trace[name] for name in names]).T
     ends = ("end_station", "end_speed", "end_merging_station", "end_merging_speed")
     seen = np.vstack([seen, [*(columns[name][row] for name in ends), *seen[-1, 4:]]])
@@ -54,7 +54,7 @@ def test_the_same_motion_has_the_same_measures(method):
 def test_running_into_the_leader_is_a_failure_of_its_own():
     host, merging = Actor("h", 4.0, 2.5), Actor("m", 5.0, 2.5)
     gaps = (12.0, 6.0, 1.0, -0.5)
-    states = [np.array([10.0 * i, 20, -30 + 10.0 * i, 20, -1.0, 0, gap, 5, 8.0 - i, 0]) for i, gap in enumerate(gaps)]
+    states = [np.array([10.0 * i, 20, -30 + 10.0 * i, 20, -1.0, gap, 5, 8.0 - i, 0]) for i, gap in enumerate(gaps)]
     meeting = Meeting(host, merging, 0, states, 2, 0.0, ending=Ending.CENSORED)
     scored, others = score([meeting], encounters_of([meeting], "000", "us101", "traffic"), Rules())
     assert KINDS[int(scored.columns["kind"][0])] == "host_into_leader"
@@ -68,7 +68,7 @@ def test_running_into_the_leader_is_a_failure_of_its_own():
 
 def test_only_cars_that_merged_next_to_the_host_are_scored():
     host, merging = Actor("h", 4.0, 2.5), Actor("m", 5.0, 2.5)
-    states = [np.zeros(10), np.zeros(10)]
+    states = [np.zeros(9), np.zeros(9)]
     found = [Meeting(host, merging, 0, states, ending=ending) for ending in Ending]
     assert [one.ending for one in to_be_scored(found)] == [Ending.SCORED, Ending.CENSORED]
     assert to_be_scored([Meeting(host, merging, 0, states[:1], ending=Ending.SCORED)]) == []
