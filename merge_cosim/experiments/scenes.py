@@ -33,8 +33,6 @@ from merge_cosim.units import DT, FloatArray
 
 USUAL_LENGTH = 600.0
 """Length of a scene [s] where its configuration does not say."""
-MEETINGS_AT_A_TIME = 64
-"""Meetings at a time in one copy of a ramp."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,9 +98,9 @@ class SceneBatch(Task):
         with tempfile.TemporaryDirectory(prefix="merge-cosim-") as folder:
             if isinstance(traffic, Traffic):
                 file = write_traffic(Path(folder), traffic.demand, ramp)
-                end, warm_up, copies = traffic.demand.duration, traffic.demand.warm_up, traffic.demand.copies
+                end, warm_up = traffic.demand.duration, traffic.demand.warm_up
             else:
-                file, warm_up, copies = traffic.file, 0.0, 1
+                file, warm_up = traffic.file, 0.0
                 end = traffic.end or Configuration.read(file).end
             yield Scene(
                 name=self.case(number),
@@ -113,7 +111,6 @@ class SceneBatch(Task):
                 warm_up=warm_up,
                 host=traffic.host,
                 attention=traffic.attention,
-                capacity=MEETINGS_AT_A_TIME * copies,
             )
 
     def simulate(self, scene: Scene, **how: Any) -> SceneRun:

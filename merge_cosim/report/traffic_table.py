@@ -29,7 +29,6 @@ COLUMNS = (
     Column("two_hosts", "two hosts at once", 0, "events"),
     Column("hosts_off_lane", "off the host lane", 0, "events"),
     Column("hosts_not_departed", "never departed", 0, "events"),
-    Column("meetings_left_out", "left out", 0, "events"),
 )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -11,31 +12,24 @@ import numpy as np
 from merge_cosim.control.acc import Acc
 from merge_cosim.control.law import FollowingLaw
 from merge_cosim.cosim.loop import Driver
+from merge_cosim.cosim.scenes.bank import Bank
 from merge_cosim.cosim.scenes.lanes import Part, RampLanes
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Ending, Meeting
 from merge_cosim.cosim.scenes.notes import Event, Notes
 from merge_cosim.cosim.scenes.roster import Actor, Roster
-from merge_cosim.observation import Observation, Setting
+from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.streams import stream_keys
-from merge_cosim.units import FloatArray
 
 SIGHT = 150.0
 """How far a host sees its leader and its follower in its lane [m]."""
-MARGIN = 0.1
-"""A car that is past the usual merging point and has not merged is taken to merge this far ahead of it [m]."""
-STANDING = 0.1
-"""Below this speed a merging car counts as stopped [m/s]."""
-_NOBODY = np.array([[-1e3], [10.0], [-1e3], [10.0], [5.0], [5.0]])
-"""State in the rows of the batch that hold no meeting: far away, and finite."""
 
 
 class HostController:
     """Observes, estimates and commands once per cycle, between two steps of SUMO.
 
-    Every (host, merging car) in each other's sight is a *meeting* and has a row in the method's batch. A host drives by
-    the smallest of the accelerations that its controller gives for its meetings, the law of following its leader in the
-    lane, and free driving.
+    Every (host, merging car) in each other's sight is a *meeting* and has a row in one of the method's batches. A host
+    drives by the smallest of the accelerations that its controller gives for its meetings, the law of following its
+    leader in the lane, and free driving.
 
     Where a car will merge is not known before it does: station 0 is the ramp's usual merging point, and once the car is
     past it, just ahead of it; from the lane change on it is where it changed.
@@ -55,7 +49,6 @@ class HostController:
         horizon: float = 4.0,
         seed: int = 0,
         host: str = "",
-        capacity: int = 64,
     ) -> None:
         """Take the wheel.
 
@@ -68,20 +61,16 @@ class HostController:
             horizon: A meeting lasts until both cars have been past the place of the lane change for this long [s].
             seed: Seed of the methods' random streams.
             host: A vehicle or type that is a host without saying so.
-            capacity: Meetings at a time; further ones are noted and left out.
         """
         self._api, self._ramp, self._driver, self._setting = api, ramp, driver, setting
-        self._attention, self._capacity, self._seed = attention, capacity, seed
+        self._attention, self._seed = attention, seed
         self._horizon = round(horizon / setting.dt)
         controller = driver.controller
         self._law: FollowingLaw = controller if isinstance(controller, FollowingLaw) else Acc()
-        driver.estimator.start(capacity, setting)
-        controller.start(capacity, setting)
         self._roster = Roster(api, RampLanes(ramp), host)
-        self._open: dict[int, Meeting] = {}
+        self._banks: list[Bank] = []
+        self._open: dict[Meeting, Bank] = {}
         self._met: dict[str, set[str]] = {}
-        self._free_rows = list(range(capacity))[::-1]
-        self._seen = np.tile(_NOBODY, capacity)
         self._cycle = 0
         self.finished: list[Meeting] = []
         self.notes = Notes()
@@ -94,13 +83,12 @@ class HostController:
         self._begin_meetings()
         hosts = list(self._roster.hosts.values())
         wanted, ahead, behind = self._by_leader(hosts)
-        if self._open:
-            rows = np.fromiter(self._open, np.int64)
-            log_odds, acceleration = self._by_meetings()
-            self._record(log_odds, ahead, behind)
-            for row, value in zip(rows.tolist(), acceleration[rows].tolist(), strict=True):
-                name = self._open[row].host.name
-                wanted[name] = min(wanted[name], value)
+        contact = set(self._api.simulation.getCollidingVehiclesIDList()) if self._open else set()
+        for bank in self._banks:
+            for meeting, log_odds, acceleration in bank.decide(self._ramp.merging_point):
+                name = meeting.host.name
+                meeting.record(log_odds, *ahead[name], behind[name], {name, meeting.merging.name} <= contact)
+                wanted[name] = min(wanted[name], acceleration)
         vehicle, dt = self._api.vehicle, self._setting.dt
         for host in hosts:
             vehicle.setSpeed(host.name, max(host.speed + wanted[host.name] * dt, 0.0))
@@ -113,14 +101,16 @@ class HostController:
 
     def close(self) -> None:
         """End the meetings that are still open, and note the hosts that never came in."""
-        for row in list(self._open):
-            self._end(row, Ending.CENSORED if self._open[row].merged_at >= 0 else Ending.NOT_NEXT)
+        for meeting in list(self._open):
+            self._end(meeting, Ending.CENSORED if meeting.merged_at >= 0 else Ending.NOT_NEXT)
         for name in self._api.simulation.getPendingVehicles():
             if self._roster.role(name) == "host":
                 line = f"host {name} never departed: no room where it was to enter"
                 self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
 
-    def _by_leader(self, hosts: list[Actor]) -> tuple[dict[str, float], dict[str, list[float]], dict[str, float]]:
+    def _by_leader(
+        self, hosts: list[Actor]
+    ) -> tuple[dict[str, float], dict[str, tuple[float, float]], dict[str, float]]:
         """By each host's name: acceleration behind its leader [m/s^2]; the leader's gap and speed; the follower's gap.
 
         SUMO's gaps leave out the minimum gap of the car behind; here they are from bumper to bumper.
@@ -129,7 +119,7 @@ class HostController:
         ahead, behind = {}, {}
         for host in hosts:
             name, gap = vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
-            ahead[host.name] = [gap + host.min_gap, vehicle.getSpeed(name)] if name else [math.inf, 0.0]
+            ahead[host.name] = (gap + host.min_gap, vehicle.getSpeed(name)) if name else (math.inf, 0.0)
             name, gap = vehicle.getFollower(host.name, SIGHT)
             behind[host.name] = gap + vehicle.getMinGap(name) if name else math.inf
         speed = np.array([host.speed for host in hosts])
@@ -140,67 +130,40 @@ class HostController:
         wanted = self._law.clip(np.where(led, np.minimum(keep, free), free))
         return dict(zip(ahead, wanted.tolist(), strict=True)), ahead, behind
 
-    def _by_meetings(self) -> tuple[FloatArray, FloatArray]:
-        """Log-odds and accelerations [m/s^2] of all rows, shape (capacity,) each."""
-        for row, meeting in self._open.items():
-            host, merging = meeting.host, meeting.merging
-            point = self._merging_point(meeting)
-            self._seen[:4, row] = host.x - point, host.speed, merging.x - point, merging.speed
-        seen = Observation(*self._seen)
-        log_odds = self._driver.estimator.update(seen)
-        target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
-        return log_odds, self._driver.controller.command(seen, log_odds, target)
-
-    def _merging_point(self, meeting: Meeting) -> float:
-        if meeting.merged_at >= 0:
-            return meeting.merge_position
-        return max(self._ramp.merging_point, meeting.merging.x + MARGIN)
-
-    def _record(self, log_odds: FloatArray, ahead: dict[str, list[float]], behind: dict[str, float]) -> None:
-        contact = set(self._api.simulation.getCollidingVehiclesIDList())
-        for row, meeting in self._open.items():
-            host, merging = meeting.host, meeting.merging
-            touching = host.name in contact and merging.name in contact
-            state = (host.x, host.speed, merging.x, merging.speed, log_odds[row])
-            meeting.states.append(np.array([*state, *ahead[host.name], behind[host.name], touching]))
-            meeting.stopped |= meeting.merged_at < 0 and merging.speed < STANDING
-
     def _end_meetings(self) -> None:
         """Take in lane changes, end what is over, and forget the merging cars that nobody will meet any more."""
         present = self._roster
-        for row, meeting in list(self._open.items()):
+        for meeting in list(self._open):
             host, merging = meeting.host, meeting.merging
             here = host.name in present.hosts and merging.name in present.merging and host.is_on(Part.HOST)
             if meeting.merged_at < 0:
-                self._await_lane_change(row, meeting, here)
+                self._await_lane_change(meeting, here)
             elif not here or not merging.is_on(Part.HOST):
-                self._end(row, Ending.CENSORED)
+                self._end(meeting, Ending.CENSORED)
             if meeting.merged_at >= 0 and meeting.both_at < 0 and host.x >= meeting.merge_position:
                 meeting.both_at = len(meeting.states)
-            elif 0 <= meeting.both_at < len(meeting.states) - self._horizon and row in self._open:
-                self._end(row, Ending.SCORED)
-        open_now = {meeting.merging.name for meeting in self._open.values()}
+            elif 0 <= meeting.both_at < len(meeting.states) - self._horizon and meeting in self._open:
+                self._end(meeting, Ending.SCORED)
+        open_now = {meeting.merging.name for meeting in self._open}
         for name, merging in list(present.merging.items()):
             if not merging.is_on(Part.MERGING) and name not in open_now:
                 present.forget(name)
 
-    def _await_lane_change(self, row: int, meeting: Meeting, here: bool) -> None:
+    def _await_lane_change(self, meeting: Meeting, here: bool) -> None:
         host, merging = meeting.host, meeting.merging
         if here and merging.is_on(Part.HOST) and self._next_to_each_other(host, merging):
             meeting.merged_at, meeting.merge_position = len(meeting.states), merging.x
         elif not here or not merging.is_on(Part.MERGING) or abs(host.x - merging.x) > 2 * self._attention.apart:
-            self._end(row, Ending.NOT_NEXT)
+            self._end(meeting, Ending.NOT_NEXT)
 
     def _next_to_each_other(self, host: Actor, merging: Actor) -> bool:
         """No car is between the two, which are in one lane."""
         leader = self._api.vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
         return merging.name in (leader[0], self._api.vehicle.getFollower(host.name, SIGHT)[0])
 
-    def _end(self, row: int, ending: Ending) -> None:
-        meeting = self._open.pop(row)
+    def _end(self, meeting: Meeting, ending: Ending) -> None:
+        self._open.pop(meeting).end(meeting)
         meeting.ending = ending
-        self._seen[:, row] = _NOBODY[:, 0]
-        self._free_rows.append(row)
         self.finished.append(meeting)
 
     def _begin_meetings(self) -> None:
@@ -209,21 +172,18 @@ class HostController:
             if host.name in met:
                 continue
             met.add(host.name)
-            if not self._free_rows:
-                line = f"host {host.name} and merging car {merging.name}: no room for more meetings at a time"
-                self.notes.add(Event.NO_ROOM, f"{host.name} {merging.name}", line)
-                continue
-            row = self._free_rows.pop()
-            others = [one.host.name for one in self._open.values() if one.merging is merging]
+            others = [one.host.name for one in self._open if one.merging is merging]
             if others:
                 line = f"merging car {merging.name} meets two hosts at once, {others[0]} and {host.name}"
                 self.notes.add(Event.TWO_HOSTS, merging.name, line)
-            self._open[row] = Meeting(host, merging, self._cycle)
-            self._seen[4:, row] = host.length, merging.length
-            rows = np.array([row])
-            keys = stream_keys(np.array([f"{host.name} {merging.name}"]), self._seed)
-            self._driver.estimator.reset(rows, np.array([-1]), keys)
-            self._driver.controller.reset(rows)
+            meeting = Meeting(host, merging, self._cycle)
+            bank = next((bank for bank in self._banks if not bank.is_full), None) or self._new_bank()
+            bank.begin(meeting, self._seed)
+            self._open[meeting] = bank
+
+    def _new_bank(self) -> Bank:
+        self._banks.append(Bank(deepcopy(self._driver), self._setting))
+        return self._banks[-1]
 
     def _in_sight(self) -> Iterator[tuple[Actor, Actor]]:
         attention, ramp = self._attention, self._ramp

@@ -5,8 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
+import numpy as np
+
 from merge_cosim.cosim.scenes.roster import Actor
 from merge_cosim.units import FloatArray
+
+MARGIN = 0.1
+"""A car that is past the usual merging point and has not merged is taken to merge this far ahead of it [m]."""
+STANDING = 0.1
+"""Below this speed a merging car counts as stopped [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +44,7 @@ class Ending(Enum):
     """Another car was between them when it merged, or it did not merge beside this host at all."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Meeting:
     """A host and a merging car, from when the host attends to it.
 
@@ -61,6 +68,20 @@ class Meeting:
     both_at: int = -1
     stopped: bool = False
     ending: Ending = Ending.OPEN
+
+    def merging_point(self, usual: float) -> float:
+        """Where the car merges, as far as one can know [m past the gore]; `usual` is where cars merge on this ramp."""
+        if self.merged_at >= 0:
+            return self.merge_position
+        return max(usual, self.merging.x + MARGIN)
+
+    def record(
+        self, log_odds: float, leader_gap: float, leader_speed: float, follower_gap: float, contact: bool
+    ) -> None:
+        """Keep one cycle."""
+        state = (self.host.x, self.host.speed, self.merging.x, self.merging.speed)
+        self.states.append(np.array([*state, log_odds, leader_gap, leader_speed, follower_gap, contact]))
+        self.stopped |= self.merged_at < 0 and self.merging.speed < STANDING
 
 
 RECORDED = (

@@ -12,7 +12,6 @@ class Event(StrEnum):
     HOST_NOT_DEPARTED = "hosts_not_departed"
     HOST_OFF_LANE = "hosts_off_lane"
     TWO_HOSTS = "two_hosts"
-    NO_ROOM = "meetings_left_out"
     TELEPORT = "teleports"
     HOST_CONTACT = "host_contacts"
     OTHER_CONTACT = "other_contacts"

@@ -46,7 +46,6 @@ class Scene:
         warm_up: The throughput is counted from here on [s].
         host: A vehicle or type that is a host without saying so.
         attention: Which merging cars a host attends to.
-        capacity: Meetings at a time.
     """
 
     name: str
@@ -57,7 +56,6 @@ class Scene:
     warm_up: float = 0.0
     host: str = ""
     attention: Attention = DEFAULT_ATTENTION
-    capacity: int = 64
 
 
 @dataclass
@@ -111,7 +109,6 @@ def run_scene(
             horizon,
             scene.seed,
             scene.host,
-            scene.capacity,
         )
         effort = Effort()
         simulation, count, arrived, time = api.simulation, api.vehicle.getIDCount, 0, 0.0

@@ -29,7 +29,7 @@ def vehicle(name, kind, position, speed, lane=0, route="main", depart=0, more=""
 
 
 @contextmanager
-def us101(tmp_path, *vehicles, types=TYPES, method="always-go", capacity=8, horizon=3.0, host="", **options):
+def us101(tmp_path, *vehicles, types=TYPES, method="always-go", horizon=3.0, host="", **options):
     """SUMO on US-101's net with these vehicles, and a controller of its hosts."""
     routes = tmp_path / "test.rou.xml"
     routes.write_text("\n".join(["<routes>", types, ROUTES, *vehicles, "</routes>"]))
@@ -49,7 +49,7 @@ def us101(tmp_path, *vehicles, types=TYPES, method="always-go", capacity=8, hori
         driver = Driver(estimators[method](), Acc())
         yield (
             libsumo,
-            HostController(libsumo, ramp, driver, Setting(), horizon=horizon, capacity=capacity, host=host),
+            HostController(libsumo, ramp, driver, Setting(), horizon=horizon, host=host),
         )
     finally:
         libsumo.close()

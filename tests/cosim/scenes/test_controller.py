@@ -145,14 +145,20 @@ def test_two_hosts_that_meet_one_car_are_noted(tmp_path):
     assert len(controller.finished) == 2
 
 
-def test_meetings_without_room_are_noted(tmp_path):
-    cars = [vehicle("h", "host", 400, 20)]
-    cars += [vehicle(f"m{i}", "merging", 400 + 30 * i, 20, route="ramp") for i in range(3)]
-    with us101(tmp_path, *cars, capacity=2) as (api, controller):
-        drive(api, controller, 3)
-        controller.close()
-    assert len(noted(controller, Event.NO_ROOM)) == 1
-    assert controller.notes.counts()["meetings_left_out"] == 1
+def test_more_meetings_than_a_bank_has_rows(tmp_path, monkeypatch):
+    """Each meeting goes on as it would with room for all."""
+    cars = [vehicle("h", "host", 410, 18)]
+    cars += [vehicle(f"m{i}", "merging", position, 18, route="ramp") for i, position in enumerate((450, 425, 400))]
+    found = []
+    for rows in (32, 2):
+        monkeypatch.setattr("merge_cosim.cosim.scenes.bank.ROWS", rows)
+        with us101(tmp_path, *cars, method="slot-time") as (api, controller):
+            drive(api, controller, 200)
+            controller.close()
+        found.append({meeting.merging.name: np.array(meeting.states) for meeting in controller.finished})
+    assert set(found[0]) == {"m0", "m1", "m2"}
+    for name, states in found[0].items():
+        np.testing.assert_array_equal(states, found[1][name])
 
 
 def test_a_host_beside_its_lane_is_noted_and_meets_nobody(tmp_path):
