@@ -48,3 +48,6 @@ class ReleasedDrivers:
             maxSpeed="100",  # [m/s] so that no log is too fast for it
         )
         path.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+
+
+DEFAULT_DRIVERS = ReleasedDrivers()
