@@ -383,6 +383,8 @@ _KINDS = "grid, random, drawn, pairs, routes, traffic"
 
 def _first_problem(error: ValidationError) -> str:
     first = min(error.errors(), key=lambda one: one["type"] == "missing")  # a misspelt key is missing, too
+    if not first["loc"]:
+        return str(first["msg"]).removeprefix("Value error, ")  # of the scenario as a whole
     *place, key = first["loc"]
     kinds = ("grid", "random", "drawn", "pairs", "routes", "traffic", "[key]")
     shown = ".".join(str(part) for part in first["loc"] if part not in kinds)
