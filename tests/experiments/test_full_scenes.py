@@ -40,12 +40,11 @@ MERGING = wavy(2, [7] * 40 + [6] * 60 + [5] * 150, at=-30, speed=14, phase=2.0)
 BESIDE = [steady(10 + k, [lane] * 250, at=-140.0 + 25 * k, speed=15) for k, lane in enumerate((1, 2, 3, 4, 4, 3, 2))]
 
 
-def batches(*cars: Car, method: str = "acc", **settings: Any) -> tuple[Batch, SceneReplay]:
-    """The pair of cars 1 and 2 alone, and among all cars."""
+def batches(*cars: Car, method: str = "acc", host: str = "-h1.1", **settings: Any) -> tuple[Batch, SceneReplay]:
+    """The pair of cars 1 and 2, or that of other hosts, alone and among all cars."""
     logged = table(*cars)
     pairs = extract_pairs(logged, US101, PairRules(), "ngsim").encounters
-    pairs = pairs.take(np.flatnonzero(pairs.case == "r-2.1-h1.1"))
-    assert len(pairs) == 1
+    pairs = pairs.take(np.flatnonzero([name.endswith(host) for name in pairs.case]))
     scenes = scenes_of(build_tracks(logged, US101, PairRules(), everywhere=True), US101, PairRules())
     scenario = load_scenario("us101-scene", {f"full_scene.{name}": value for name, value in settings.items()})
     chosen = Method.parse(method)
@@ -159,6 +158,16 @@ def test_real_pairs_have_the_rows_of_the_pair_test_when_the_leader_is_not_heeded
                 left_out += ("failed", "failure_kind", "censored")
             assert_same(one, other, left_out)
     workplace.close()
+
+
+def test_a_case_does_not_feel_the_others_of_its_batch() -> None:
+    batch, among = batches(HOST, MERGING, LEADER, *FOLLOWERS, *BESIDE, method="pgm", others="released", host="")
+    assert len(batch) == 2
+    whole = among.run(Workplace())[0].to_pylist()
+    assert whole[0]["distance_m"] != whole[1]["distance_m"]
+    for order in ([0], [1], [1, 0]):
+        rows = among.take(np.array(order)).run(Workplace())[0].to_pylist()
+        assert rows == [whole[number] for number in order]
 
 
 def test_a_part_has_its_own_scene_and_the_digest_sees_all_cars() -> None:
