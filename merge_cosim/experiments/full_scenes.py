@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from merge_cosim.cosim.loop import Driver, Effort, Run
 from merge_cosim.cosim.plant import Plant
-from merge_cosim.cosim.scenes.full import Place, ScenePlant
+from merge_cosim.cosim.scenes.scene_plant import Place, ScenePlant
 from merge_cosim.cosim.scoring import HOST_INTO_LEADER
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.scenario import Pairs, Scenario

@@ -10,7 +10,7 @@ import pyarrow as pa
 from merge_cosim.control.acc import Acc
 from merge_cosim.cosim.decisions import GATES
 from merge_cosim.cosim.loop import Run
-from merge_cosim.cosim.scenes.full import AROUND
+from merge_cosim.cosim.scenes.scene_plant import AROUND
 from merge_cosim.cosim.scoring import GOAL, KINDS
 from merge_cosim.encounter import NEVER, Encounters, Intention
 from merge_cosim.observation import Setting

@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from merge_cosim.cosim.scenes.drivers import ReleasedDrivers
-from merge_cosim.cosim.scenes.full import FullScene
+from merge_cosim.cosim.scenes.full_scene import FullScene
 from merge_cosim.cosim.scenes.meetings import Attention
 from merge_cosim.cosim.scoring import Rules
 from merge_cosim.errors import UserError

@@ -14,7 +14,7 @@ import pandas as pd
 from merge_cosim.cosim.attached import Address, AttachedSession
 from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.plant import SumoPlant
-from merge_cosim.cosim.scenes.full import ScenePlant
+from merge_cosim.cosim.scenes.scene_plant import ScenePlant
 from merge_cosim.cosim.session import Session, SumoOptions, TraciSession, connection_kept
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.full_scenes import SceneReplay

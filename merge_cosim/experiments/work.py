@@ -14,7 +14,7 @@ from merge_cosim.control.acc import Acc
 from merge_cosim.control.base import controllers
 from merge_cosim.cosim.loop import Driver, Effort, Run, simulate
 from merge_cosim.cosim.plant import Plant, SumoPlant
-from merge_cosim.cosim.scenes.full import ScenePlant
+from merge_cosim.cosim.scenes.scene_plant import ScenePlant
 from merge_cosim.encounter import Encounters
 from merge_cosim.experiments.human import simulate_human
 from merge_cosim.experiments.methods import Method

@@ -47,5 +47,7 @@ def test_a_leader_stays_the_leader_when_the_host_drives_into_it() -> None:
     seen = Neighbours(5.0, sight=50.0)
     look(seen, ("leader", 104.5))
     assert look(seen, ("leader", 103.0)) == ("leader", -1.0, math.inf)
-    assert look(seen, ("leader", 102.0)) == ("leader", -2.0, math.inf)
-    assert seen.through == []
+    assert look(seen, ("leader", 100.0)) == ("leader", -4.0, math.inf)
+    for x in (99.0, 96.0, 90.0):  # the host is through it
+        assert look(seen, ("leader", x)) == ("", math.inf, math.inf)
+    assert (seen.through, seen.struck) == ([], {"leader"})

@@ -1,24 +1,22 @@
-"""Full-scene replay: an encounter of the pair tests among all logged cars of its recording."""
+"""A plant for full-scene replay: an encounter of the pair tests among all logged cars of its recording."""
 
 from __future__ import annotations
 
 import math
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat
 
 from merge_cosim.control.acc import Acc
 from merge_cosim.control.base import Controller
 from merge_cosim.control.law import FollowingLaw
 from merge_cosim.cosim.loop import Driver
 from merge_cosim.cosim.plant import COLORS
-from merge_cosim.cosim.scenes.drivers import DEFAULT_DRIVERS, ReleasedDrivers
+from merge_cosim.cosim.scenes.full_scene import FullScene
 from merge_cosim.cosim.scenes.logged import LoggedTraffic
 from merge_cosim.cosim.scenes.neighbours import InLane, Neighbours
 from merge_cosim.cosim.scenes.roadway import Roadway
@@ -35,27 +33,6 @@ SIGHT = 150.0
 """How far the host sees its leader and its follower [m]."""
 Place = tuple[LoggedScene, PairInScene]
 """The scene of an encounter, and where the encounter lies in it."""
-
-
-@dataclass(frozen=True)
-class FullScene:
-    """How the other logged cars take part, and from when on the method drives the host.
-
-    Attributes:
-        others: `log`: all keep to their logs, and may drive through the host; `released`: those that come near the host
-            are handed to SUMO's models. The merging car keeps to its log.
-        take_over: When the method takes the wheel, from the encounter's start on [s]; it observes from the start.
-        heed_leader: The host keeps distance to the car ahead in its lane as well.
-        ahead, behind: Which cars are near [m]; see `LoggedTraffic.release_near`.
-        drivers: How released cars drive.
-    """
-
-    others: Literal["log", "released"] = "log"
-    take_over: NonNegativeFloat = 0.0
-    heed_leader: bool = True
-    ahead: PositiveFloat = 30.0
-    behind: PositiveFloat = 60.0
-    drivers: ReleasedDrivers = DEFAULT_DRIVERS
 
 
 AROUND = ("min_leader_gap_m", "min_leader_ttc_s", "min_follower_gap_m")
