@@ -127,6 +127,16 @@ def test_logged_cars_drive_through_a_host_that_stops_unless_they_are_released() 
     assert (facts["driven_through"], facts["released"]) == (0, 3)
 
 
+def test_a_released_car_that_the_merging_car_drives_into_is_told() -> None:
+    x = -5.0 + np.cumsum(np.where(np.arange(120) < 10, 7.0, 25.0)) * 0.1
+    slow = Car(31, [6 if at < 205 else 8 for at in x], x)  # in its log it makes way
+    how = {"others": "released", "drivers.accel": 0.1}
+    facts = facts_of(batches(HOST, MERGING, slow, method="always-yield", **how)[1])[1]
+    assert (facts["released"], facts["other_contacts"]) == (1, 1)
+    assert ["other_contacts", "SUMO reports a contact of 2.1 and 31.1"] in facts["notes"]
+    assert facts_of(batches(HOST, MERGING, slow, method="always-yield")[1])[1]["other_contacts"] == 0
+
+
 def test_before_the_take_over_the_host_is_the_human() -> None:
     cars = (HOST, MERGING, LEADER, *FOLLOWERS)
     among = batches(*cars, method="always-yield", take_over=1000.0)[1]

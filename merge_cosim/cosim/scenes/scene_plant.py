@@ -49,7 +49,7 @@ class ScenePlant:
     Attributes:
         around: `AROUND`, shape (n,) each.
         facts: Of each encounter that is over: `cars` in the net at its start, and `released`, `blocked`,
-            `driven_through`; with `notes` of the last, a line each.
+            `driven_through`, `other_contacts` (of released cars with others); with `notes`, a line each.
         vehicle_steps: Cars times steps.
     """
 
@@ -104,6 +104,7 @@ class ScenePlant:
         self._host_lane = find_site(scene.site).host_lane
         self.neighbours = Neighbours(self._lengths[pair.host], SIGHT)
         self.leader_speed = 0.0
+        self._others_touched: set[tuple[str, ...]] = set()
         words, net = self._options.arguments(), self._ramp.net
         self._api, _ = traci_started(words, net, gui=True) if self._gui else libsumo_started(words, net)
         self._traffic = LoggedTraffic(self._api, scene, self._ramp, self._rules.drivers)
@@ -166,8 +167,11 @@ class ScenePlant:
         through = self.neighbours.through
         notes = [("driven_through", f"logged car {name} drove into host {self._pair.host}") for name in through]
         notes += [("blocked", f"logged car {name} did not come in: no room") for name in self._traffic.blocked]
+        touched = sorted(self._others_touched)
+        notes += [("other_contacts", f"SUMO reports a contact of {one} and {other}") for one, other in touched]
         counts = {"released": len(self._traffic.released), "blocked": len(self._traffic.blocked)}
-        self.facts.append({"cars": self._cars, **counts, "driven_through": len(through), "notes": notes})
+        counts |= {"driven_through": len(through), "other_contacts": len(touched)}
+        self.facts.append({"cars": self._cars, **counts, "notes": notes})
         self._traffic = None
         self._api.close()
 
@@ -199,11 +203,16 @@ class ScenePlant:
             self.around[name][self._case] = min(self.around[name][self._case], value)
 
     def _touch(self) -> bool:
-        """Whether SUMO reports a contact of the encounter's two cars."""
+        """Whether SUMO reports a contact of the encounter's two cars; those of released cars with others are noted."""
         if not self._api.simulation.getCollidingVehiclesNumber():
             return False
-        pair = {self._pair.host, self._pair.merging}
-        return any({one.collider, one.victim} == pair for one in self._api.simulation.getCollisions())
+        assert self._traffic is not None
+        released, own = set(self._traffic.released), {self._pair.host, self._pair.merging}
+        contacts = [{one.collider, one.victim} for one in self._api.simulation.getCollisions()]
+        self._others_touched |= {
+            tuple(sorted(one)) for one in contacts if one & released and self._pair.host not in one
+        }
+        return own in contacts
 
     def _take_main_road(self, host: str) -> None:
         """Let a host stay on the main road, wherever its log leads."""
