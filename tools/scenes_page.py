@@ -16,6 +16,7 @@ from merge_cosim.experiments.full_scenes import SceneReplay
 from merge_cosim.experiments.plan import SweepRequest, plan
 from merge_cosim.experiments.store import SCENES_CSV, ResultFolder
 from merge_cosim.experiments.sweep import sweep
+from merge_cosim.ramps.ramp import Ramp
 
 PAGE = Path(__file__).parent.parent / "docs" / "scenes.md"
 BLOCK = re.compile(r"<!-- table: (?P<name>\S+) -->\n.*?<!-- end -->", re.DOTALL)
@@ -94,10 +95,32 @@ def handed(facts: pd.DataFrame) -> str:
     return f"{facts['released'].mean():.1f} / {facts['blocked'].mean():.1f}"
 
 
-def fullness(data: Path) -> str:
-    """The recordings that hold test pairs: their length, cars, cars at a time, and pairs."""
+def replay(data: Path) -> SceneReplay:
+    """All cases."""
     (batch,) = plan(SweepRequest(["us101-scene"], ["acc"], data=data, source="ngsim"))
     assert isinstance(batch, SceneReplay)
+    return batch
+
+
+def starts(batch: SceneReplay) -> str:
+    """Time gaps of the hosts to their leaders at the start."""
+    plant = batch.open(Ramp.load(batch.scenario.ramp))
+    found: dict[str, list[float]] = {"fragments": [], "episodes": []}
+    for number in range(len(batch)):
+        plant.place(np.array([0]), batch.encounters, np.array([number]))
+        gap = plant.neighbours.leader_gap / float(plant.host_speed[0])
+        found[kind(batch.case(number))].append(gap)
+    plant.close()
+    lines = []
+    for name, gaps in found.items():
+        led = np.array([gap for gap in gaps if np.isfinite(gap)])
+        below = [str(int((led < limit).sum())) for limit in (1.0, 1.5)]
+        lines.append([name, str(len(gaps)), str(len(led)), f"{np.median(led):.1f}", *below])
+    return markdown(["", "cases", "with a leader", "its time gap, median [s]", "below 1 s", "below 1.5 s"], lines)
+
+
+def fullness(batch: SceneReplay) -> str:
+    """The recordings that hold test pairs: their length, cars, cars at a time, and pairs."""
     lines = []
     for name, places in groups(batch):
         scenes = list({scene.recording: scene for scene, _ in places}.values())
@@ -129,8 +152,10 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     given = parser.parse_args()
     rows, facts = run_all(given.data, given.out, given.jobs)
+    batch = replay(given.data)
     tables = {
-        "fullness": fullness(given.data),
+        "fullness": fullness(batch),
+        "starts": starts(batch),
         "failures": by_method(rows, tuple(RUNS.values()), failures),
         "means": by_method(rows, (ALONE, LOG, RELEASED), means),
         "gaps": by_method(rows, (LOG, RELEASED), gaps),
