@@ -170,7 +170,7 @@ class Encounters:
         for value in values:
             for array in (value.values, value.offsets) if isinstance(value, Ragged) else (value,):
                 if isinstance(array, np.ndarray):
-                    held.update("\0".join(array.tolist()).encode() if array.dtype.kind == "U" else array.tobytes())
+                    held.update("\0".join(array.tolist()).encode() if array.dtype.kind in "UO" else array.tobytes())
         return held.hexdigest()[:16]
 
     @staticmethod

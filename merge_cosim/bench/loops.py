@@ -23,7 +23,7 @@ from merge_cosim.cosim.loop import Effort
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.plan import SweepRequest, plan_encounters
-from merge_cosim.experiments.work import Batch, Workplace, simulate_batch
+from merge_cosim.experiments.work import Batch, Workplace
 from merge_cosim.files import shipped
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.units import DT
@@ -63,9 +63,9 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
         file = Path(folder) / "task.json"
         file.write_text(json.dumps(_task(batch, ramp, batch.encounters.take(chosen))), encoding="utf-8")
         workplace = Workplace()
-        simulate_batch(batch, workplace.plant(ramp, len(batch.encounters), 0), ramp)  # to warm up
+        batch.simulate(workplace.plant(ramp, len(batch.encounters), 0), ramp)  # to warm up
         for _ in range(rounds):
-            run = simulate_batch(batch, workplace.plant(ramp, len(batch.encounters), 0), ramp)
+            run = batch.simulate(workplace.plant(ramp, len(batch.encounters), 0), ramp)
             efforts.append(run.effort)
             ours = tuple((run.columns["kind"][chosen] > 0).tolist())
             for name, script in ALTERNATIVES.items():

@@ -33,8 +33,9 @@ SHOWN = (
 SHOWN_TRAFFIC = (
     *("scenario", "variation", "method", "scenes", "throughput_veh_h", "mean_speed", "time_loss_s", "hosts"),
     *("meetings", "meetings_scored", "merging_stopped", "host_contacts", "other_contacts", "emergency_brakings"),
+    *("cars", "released", "blocked", "driven_through"),
 )
-"""The same of the table of scenes."""
+"""The same of the table of scenes; living traffic and full-scene replay have some of them each."""
 
 USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 """typer's UsageError; typer gives it no public name."""
@@ -99,7 +100,8 @@ def sweep(
         rows = [{name: row[name] for name in SHOWN} for row in folder.read_json(SUMMARY_JSON)]
         show_table(rows, f"{out}: {', '.join(scenarios)}")
         if traffic := folder.traffic():
-            show_table([{name: row[name] for name in SHOWN_TRAFFIC} for row in traffic], "the traffic as a whole")
+            shown = [name for name in SHOWN_TRAFFIC if name in traffic[0]]
+            show_table([{name: row[name] for name in shown} for row in traffic], "the traffic as a whole")
     for line in folder.told():
         typer.echo(line, err=True)
 

@@ -197,8 +197,13 @@ class TraciSession(ApiSession):
 
     def follow(self, car: str) -> None:
         """Let the view of sumo-gui follow a car."""
-        self._api.gui.trackVehicle(_VIEW, car)
-        self._api.gui.setZoom(_VIEW, _ZOOM)
+        follow(self._api, car)
+
+
+def follow(api: Any, car: str) -> None:
+    """Let the view of the sumo-gui behind a module traci follow a car."""
+    api.gui.trackVehicle(_VIEW, car)
+    api.gui.setZoom(_VIEW, _ZOOM)
 
 
 def own_traci() -> Any:

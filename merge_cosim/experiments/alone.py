@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +10,7 @@ import pyarrow as pa
 
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.experiments.store import ResultFolder
-from merge_cosim.experiments.work import Batch, Task, Workplace, simulate_batch
+from merge_cosim.experiments.work import Batch, Task, Workplace
 from merge_cosim.ramps.ramp import Ramp
 
 SINGLE_CASES = 5
@@ -42,9 +41,9 @@ def run_alone(tasks: Sequence[Task], results: ResultFolder) -> tuple[dict[str, f
                 results.rows_of(scenario, "", ["case", "failed", "distance_m"]).to_pandas()
             )
         order = np.argsort(batch.encounters.case != telling[scenario], kind="stable")[:SINGLE_CASES]
-        few = replace(batch, encounters=batch.encounters.take(order))
+        few = batch.take(order)
         ramp = Ramp.load(batch.scenario.ramp)
-        run = simulate_batch(few, workplace.plant(ramp, 1, batch.seed), ramp, traced=(0,))
+        run = few.simulate(few.plant(workplace, ramp), ramp, traced=(0,))
         efforts.setdefault(batch.method.name, Effort()).add(run.effort)
         names = {"scenario": scenario, "case": str(few.encounters.case[0]), "method": batch.method.name}
         records.append(pd.DataFrame(run.traces[0]).assign(**names))

@@ -10,6 +10,7 @@ import pyarrow as pa
 from merge_cosim.control.acc import Acc
 from merge_cosim.cosim.decisions import GATES
 from merge_cosim.cosim.loop import Run
+from merge_cosim.cosim.scenes.scene_plant import AROUND
 from merge_cosim.cosim.scoring import GOAL, KINDS
 from merge_cosim.encounter import NEVER, Encounters, Intention
 from merge_cosim.observation import Setting
@@ -136,6 +137,7 @@ def result_rows(
         "end_s": c["end_cycle"] * dt,
         "ambiguity_s": ambiguity,
         "sumo_collision": c["sumo_collision"].astype(bool),
+        **{name: _finite(c[name]) for name in AROUND if name in c},
         **more,
     }
     arrays = []

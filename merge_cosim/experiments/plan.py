@@ -15,6 +15,7 @@ import numpy as np
 import merge_cosim
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
+from merge_cosim.experiments.full_scenes import SceneReplay, load_scenes
 from merge_cosim.experiments.methods import (
     CONSTANT,
     ORACLE_BEST,
@@ -189,11 +190,12 @@ def _encounter_batches(
     encounters, left_out = _on_the_ramp(scenario, encounters)
     for source in dict.fromkeys(encounters.source.tolist()):
         chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
+        scenes = None if scenario.full_scene is None else load_scenes(scenario, source, request.data)
         for method in methods_for(chosen, methods):
             model = _model(method, source, request)
             if model is not None:
                 _refuse_trained(scenario, chosen, model)
-            yield Batch(
+            batch = Batch(
                 scenario=scenario,
                 variation=variation,
                 method=method,
@@ -202,6 +204,7 @@ def _encounter_batches(
                 seed=request.seed,
                 left_out=left_out,
             )
+            yield batch if scenes is None else SceneReplay.of(batch, scenes)
 
 
 def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:

@@ -21,6 +21,8 @@ from pydantic import (
     model_validator,
 )
 
+from merge_cosim.cosim.scenes.drivers import ReleasedDrivers
+from merge_cosim.cosim.scenes.full_scene import FullScene
 from merge_cosim.cosim.scenes.meetings import Attention
 from merge_cosim.cosim.scoring import Rules
 from merge_cosim.errors import UserError
@@ -242,6 +244,7 @@ class Scenario(_Strict):
         ramp: Name or folder of the ramp.
         encounters: Where the initial states come from.
         merging: The merging car's `model` and its parameters.
+        full_scene: How all other logged cars take part; None for host and merging car alone.
         test: How an encounter is scored.
         speed_limit: Speed limit [m/s]; the ramp's own if not given.
         name: Name of the scenario, that of its file.
@@ -252,6 +255,7 @@ class Scenario(_Strict):
     ramp: str
     encounters: Annotated[Grid | Random | Drawn | Pairs | Routes | Traffic, Field(discriminator="kind")]
     merging: dict[str, Any]
+    full_scene: FullScene | None = None
     test: Rules = Rules()
     speed_limit: PositiveFloat | None = None
     name: str
@@ -271,6 +275,11 @@ class Scenario(_Strict):
             raise ValueError(f"merging.model must be '{BY_SUMO}' in traffic, which SUMO drives")
         if self.is_scene and not isinstance(self.encounters, (Traffic, Routes)):
             raise ValueError(f"merging.model = '{BY_SUMO}' needs encounters of the kind traffic or routes")
+        if self.full_scene is not None:
+            if not self.is_replay or not isinstance(self.encounters, Pairs):
+                raise ValueError("full_scene needs logged cars: encounters.kind = 'pairs' and merging.model = 'replay'")
+            if self.encounters.merge_point != "car":
+                raise ValueError("full_scene needs encounters.merge_point = 'car', where the logged lane changes are")
         return self
 
     @property
@@ -290,7 +299,7 @@ class Scenario(_Strict):
         return self.merging.get("model") == "replay"
 
 
-SECTIONS = ("ramp", "encounters", "merging", "test", "speed_limit")
+SECTIONS = ("ramp", "encounters", "merging", "full_scene", "test", "speed_limit")
 """What of a scenario can be set or varied from the command line."""
 
 
@@ -353,7 +362,7 @@ def _set(document: dict[str, Any], name: str, value: Any) -> None:
     document[last] = value
 
 
-_KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules] | type[Demand]] = {
+_KNOWN: dict[tuple[str, ...], type] = {
     (): Scenario,
     ("encounters", "grid"): Grid,
     ("encounters", "random"): Random,
@@ -363,6 +372,8 @@ _KNOWN: dict[tuple[str, ...], type[BaseModel] | type[Rules] | type[PairRules] | 
     ("encounters", "traffic"): Traffic,
     ("encounters", "traffic", "demand"): Demand,
     ("encounters", "pairs", "rules"): PairRules,
+    ("full_scene",): FullScene,
+    ("full_scene", "drivers"): ReleasedDrivers,
     ("test",): Rules,
 }
 
@@ -373,7 +384,7 @@ _KINDS = "grid, random, drawn, pairs, routes, traffic"
 def _first_problem(error: ValidationError) -> str:
     first = min(error.errors(), key=lambda one: one["type"] == "missing")  # a misspelt key is missing, too
     if not first["loc"]:
-        return first["msg"].removeprefix("Value error, ")
+        return str(first["msg"]).removeprefix("Value error, ")  # of the scenario as a whole
     *place, key = first["loc"]
     kinds = ("grid", "random", "drawn", "pairs", "routes", "traffic", "[key]")
     shown = ".".join(str(part) for part in first["loc"] if part not in kinds)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -20,10 +19,10 @@ from merge_cosim.cosim.scenes.meetings import Ending, Meeting
 from merge_cosim.cosim.scenes.run import Scene, SceneRun, run_scene
 from merge_cosim.cosim.scenes.scoring import encounters_of, score, to_be_scored
 from merge_cosim.cosim.scoring import Rules
-from merge_cosim.experiments.outcome import SCHEMA, result_rows
+from merge_cosim.experiments.outcome import result_rows
 from merge_cosim.experiments.scenario import Routes, Traffic
 from merge_cosim.experiments.statistics.summary import TRAFFIC
-from merge_cosim.experiments.store import SCENE_FACTS
+from merge_cosim.experiments.store import with_scene_facts
 from merge_cosim.experiments.work import Task, Workplace, free_law
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
@@ -87,8 +86,7 @@ class SceneBatch(Task):
             effort.add(run.effort)
             tables.append(self.rows(run, scene))
             facts.append(self.facts(run, scene))
-        rows = pa.concat_tables(tables)
-        return rows.replace_schema_metadata({**(SCHEMA.metadata or {}), SCENE_FACTS: json.dumps(facts)}), effort
+        return with_scene_facts(pa.concat_tables(tables), facts), effort
 
     @contextmanager
     def scene(self, number: int) -> Iterator[Scene]:

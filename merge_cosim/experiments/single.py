@@ -14,12 +14,14 @@ import pandas as pd
 from merge_cosim.cosim.attached import Address, AttachedSession
 from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.plant import SumoPlant
+from merge_cosim.cosim.scenes.scene_plant import ScenePlant
 from merge_cosim.cosim.session import Session, SumoOptions, TraciSession, connection_kept
 from merge_cosim.errors import UserError
+from merge_cosim.experiments.full_scenes import SceneReplay
 from merge_cosim.experiments.plan import SweepRequest, plan, plan_encounters
 from merge_cosim.experiments.scenes import SceneBatch
 from merge_cosim.experiments.single_scene import export_scene, run_scene_alone
-from merge_cosim.experiments.work import Batch, rows_of, simulate_batch
+from merge_cosim.experiments.work import Batch
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.routes import write_encounter
 from merge_cosim.ramps.tiles import tile_id
@@ -87,22 +89,32 @@ def trace_case(
         raise UserError(
             f"{wanted[0]}: the method 'human' is the log itself and is not driven in SUMO; leave one of them out"
         )
-    extra = outputs.prepare()
-    if attach is not None:
-        plant = SumoPlant(ramp, 1, batch.seed, lambda options: AttachedSession(options, attach), tiled=False)
-    elif gui_delay is None:
-        plant = SumoPlant(ramp, 1, batch.seed, extra=extra)
-    else:
-        shown = (*view_options(ramp.net.parent), "--delay", str(gui_delay))
-        plant = SumoPlant(ramp, 1, batch.seed, _open_window, (*shown, *extra))
+    plant = _open_plant(batch, ramp, gui_delay, outputs.prepare(), attach)
     try:
-        if isinstance(plant.session, TraciSession):
-            plant.session.follow(tile_id(0, "host"))
         with connection_kept():
-            run = simulate_batch(batch, plant, ramp, traced=(0,))
+            run = batch.simulate(plant, ramp, traced=(0,))
     finally:
         plant.close()
-    return rows_of(batch, run, ramp).to_pylist()[0], pd.DataFrame(run.traces[0])
+    return batch.rows(run, ramp).to_pylist()[0], pd.DataFrame(run.traces[0])
+
+
+def _open_plant(
+    batch: Batch, ramp: Ramp, gui_delay: int | None, extra: tuple[str, ...], attach: Address | None
+) -> SumoPlant | ScenePlant:
+    """SUMO for a batch of one."""
+    if isinstance(batch, SceneReplay):
+        if attach is not None:
+            raise UserError("--attach: not with full_scene, which starts SUMO with a recording's cars; leave it out")
+        return batch.open(ramp, gui_delay, extra)
+    if attach is not None:
+        return SumoPlant(ramp, 1, batch.seed, lambda options: AttachedSession(options, attach), tiled=False)
+    if gui_delay is None:
+        return SumoPlant(ramp, 1, batch.seed, extra=extra)
+    shown = (*view_options(ramp.net.parent), "--delay", str(gui_delay))
+    plant = SumoPlant(ramp, 1, batch.seed, _open_window, (*shown, *extra))
+    assert isinstance(plant.session, TraciSession)
+    plant.session.follow(tile_id(0, "host"))
+    return plant
 
 
 def trace_methods(request: SweepRequest, case: str) -> tuple[pd.DataFrame, dict[str, bool]]:

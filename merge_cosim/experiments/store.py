@@ -215,6 +215,11 @@ class ResultFolder:
         return json.loads(file.read_text(encoding="utf-8"))
 
 
+def with_scene_facts(rows: pa.Table, facts: list[dict[str, Any]]) -> pa.Table:
+    """Result rows with the facts of the scenes that they come from, for `ResultFolder.add`."""
+    return rows.replace_schema_metadata({**(SCHEMA.metadata or {}), SCENE_FACTS: json.dumps(facts)})
+
+
 def _csv_rows(file: Path) -> list[dict[str, Any]]:
     if not file.is_file():
         return []

@@ -11,8 +11,9 @@ import pyarrow as pa
 
 from merge_cosim.control.acc import Acc
 from merge_cosim.control.base import controllers
-from merge_cosim.cosim.loop import Effort, Run, simulate
+from merge_cosim.cosim.loop import Driver, Effort, Run, simulate
 from merge_cosim.cosim.plant import Plant, SumoPlant
+from merge_cosim.cosim.scenes.scene_plant import ScenePlant
 from merge_cosim.cosim.scoring import expected_cycles
 from merge_cosim.encounter import Encounters
 from merge_cosim.experiments.human import simulate_human
@@ -22,7 +23,7 @@ from merge_cosim.experiments.scenario import Scenario
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.units import FloatArray
+from merge_cosim.units import FloatArray, IntArray
 
 TILES = 192
 """Encounters side by side in one SUMO. From 128 to 208 tiles a case costs the same: more of them spread the cost of a
@@ -116,6 +117,10 @@ class Batch(Task):
         """The cases `first` to `last - 1`, made only when asked for, so that a million cases are not held twice."""
         return replace(self, encounters=self.encounters.part(first, last), left_out=())
 
+    def take(self, rows: IntArray) -> Self:
+        """The chosen cases, in that order."""
+        return replace(self, encounters=self.encounters.take(rows))
+
     def cycles(self) -> FloatArray:
         """Expected cycles of each case; see `expected_cycles`."""
         return expected_cycles(self.encounters, self.scenario.test)
@@ -127,8 +132,32 @@ class Batch(Task):
     def run(self, workplace: Workplace) -> tuple[pa.Table, Effort]:
         """Simulate the cases on tiles."""
         ramp = Ramp.load(self.scenario.ramp)
-        run = simulate_batch(self, workplace.plant(ramp, len(self), self.seed), ramp)
-        return rows_of(self, run, ramp), run.effort
+        run = self.simulate(self.plant(workplace, ramp), ramp)
+        return self.rows(run, ramp), run.effort
+
+    def plant(self, workplace: Workplace, ramp: Ramp) -> Plant:
+        """What moves the cars."""
+        return workplace.plant(ramp, len(self), self.seed)
+
+    def driver(self, plant: Plant) -> Driver:
+        """The method, as it drives in a plant."""
+        return self.method.driver(self.model)
+
+    def simulate(self, plant: Plant, ramp: Ramp, traced: Sequence[int] = ()) -> Run:
+        """Simulate the cases on a given plant; the human host needs none."""
+        rules, setting, car = self.scenario.test, self.setting(ramp), self.scenario.merging_car()
+        if self.method.is_human:
+            return simulate_human(self.encounters, car, rules, setting, tuple(traced))
+        driver = self.driver(plant)
+        return self.finished(plant, simulate(plant, self.encounters, driver, car, rules, setting, traced, self.seed))
+
+    def finished(self, plant: Plant, run: Run) -> Run:
+        """The run with what the plant alone knows of it."""
+        return run
+
+    def rows(self, run: Run, ramp: Ramp) -> pa.Table:
+        """The result rows of a run."""
+        return result_rows(run, self.encounters, self.setting(ramp), free_law(self.method), self.names)
 
 
 class Workplace:
@@ -137,44 +166,28 @@ class Workplace:
     def __init__(self, tiles: int = TILES) -> None:
         self._tiles = tiles
         self._open: tuple[str, int, int] | None = None
-        self._plant: SumoPlant | None = None
+        self._plant: SumoPlant | ScenePlant | None = None
 
     def plant(self, ramp: Ramp, cases: int, seed: int) -> SumoPlant:
         """A plant on this ramp, with no more tiles than there are cases."""
         tiles = min(self._tiles, cases)
         wanted = (str(ramp.net), tiles, seed)
-        if self._plant is None or self._open != wanted:
+        if not isinstance(self._plant, SumoPlant) or self._open != wanted:
             self.close()
             self._plant, self._open = SumoPlant(ramp, tiles, seed), wanted
         return self._plant
+
+    def hold(self, plant: ScenePlant) -> ScenePlant:
+        """End the simulation that is open, and keep another plant in its place."""
+        self.close()
+        self._plant = plant
+        return plant
 
     def close(self) -> None:
         """End the simulation."""
         if self._plant is not None:
             self._plant.close()
             self._plant = None
-
-
-def simulate_batch(batch: Batch, plant: Plant, ramp: Ramp, traced: Sequence[int] = ()) -> Run:
-    """Simulate a batch on a given plant; the human host needs none."""
-    if batch.method.is_human:
-        car, rules = batch.scenario.merging_car(), batch.scenario.test
-        return simulate_human(batch.encounters, car, rules, batch.setting(ramp), tuple(traced))
-    return simulate(
-        plant,
-        batch.encounters,
-        batch.method.driver(batch.model),
-        batch.scenario.merging_car(),
-        batch.scenario.test,
-        batch.setting(ramp),
-        traced,
-        batch.seed,
-    )
-
-
-def rows_of(batch: Batch, run: Run, ramp: Ramp) -> pa.Table:
-    """The result rows of a batch's run."""
-    return result_rows(run, batch.encounters, batch.setting(ramp), free_law(batch.method), batch.names)
 
 
 def free_law(method: Method) -> Acc:

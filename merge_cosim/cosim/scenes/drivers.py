@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from lxml import etree
 
@@ -16,15 +17,15 @@ class ReleasedDrivers:
     """A driver in SUMO's terms; the defaults are those of the surrogate's usual driver, without its scatter.
 
     Attributes:
-        car_following: SUMO's car-following model, such as `EIDM`, `IDM` or `Krauss`.
+        car_following: SUMO's car-following model.
         lane_changing: SUMO's lane-changing model.
         tau: Time gap that he keeps [s].
         accel, decel: Comfortable acceleration and deceleration [m/s^2].
         min_gap: Gap to the car ahead at standstill [m].
     """
 
-    car_following: str = "EIDM"
-    lane_changing: str = "LC2013"
+    car_following: Literal["Krauss", "IDM", "EIDM"] = "EIDM"
+    lane_changing: Literal["LC2013", "SL2015"] = "LC2013"
     tau: float = 0.5
     accel: float = 2.2
     decel: float = 3.0
@@ -48,3 +49,6 @@ class ReleasedDrivers:
             maxSpeed="100",  # [m/s] so that no log is too fast for it
         )
         path.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+
+
+DEFAULT_DRIVERS = ReleasedDrivers()

@@ -1,0 +1,173 @@
+"""Full-scene replay in numbers: python tools/scenes_page.py --data DIR --out OUT fills the tables of docs/scenes.md.
+
+The page is written by hand but for its blocks `<!-- table: NAME -->` ... `<!-- end -->`. OUT gets the sweeps they rest
+on; one that is there already and the same is not run again. Beside `full_scene` as shipped, its variations are run.
+"""
+
+import argparse
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from merge_cosim.experiments.full_scenes import SceneReplay
+from merge_cosim.experiments.plan import SweepRequest, plan
+from merge_cosim.experiments.store import SCENES_CSV, ResultFolder
+from merge_cosim.experiments.sweep import sweep
+from merge_cosim.ramps.ramp import Ramp
+
+PAGE = Path(__file__).parent.parent / "docs" / "scenes.md"
+BLOCK = re.compile(r"<!-- table: (?P<name>\S+) -->\n.*?<!-- end -->", re.DOTALL)
+METHODS = ("acc", "slot", "pgm", "fg", "ipcb", "always-go", "always-yield")
+ALONE, LOG, RELEASED, BLIND = "the pair alone", "log", "released", "log, leader not heeded"
+RUNS = {
+    ("us101-replay", ""): ALONE,
+    ("us101-scene", "full_scene.heed_leader=False"): BLIND,
+    ("us101-scene", ""): LOG,
+    ("us101-scene", "full_scene.others=released"): RELEASED,
+}
+"""What is compared, by scenario and variation."""
+
+
+def kind(case: str) -> str:
+    """Which kind of recording a case comes from."""
+    return "episodes" if case.startswith("episode") else "fragments"
+
+
+def run_all(data: Path, out: Path, jobs: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Result rows of all runs, and facts of their scenes, with the columns `run` and `kind`."""
+    variations = [("full_scene.others", ["released"]), ("full_scene.heed_leader", [False])]
+    rows, facts = [], []
+    for name, varied in (("us101-replay", []), ("us101-scene", variations)):
+        request = SweepRequest([name], METHODS, variations=varied, data=data, source="ngsim", jobs=jobs)
+        sweep(request, out / name, reuse=True)
+        rows.append(ResultFolder(out / name).results().to_pandas())
+        if varied:
+            facts.append(pd.read_csv(out / name / SCENES_CSV, keep_default_na=False))
+    return tuple(
+        pd.concat(parts).assign(
+            run=lambda f: [RUNS[key] for key in zip(f["scenario"], f["variation"], strict=True)],
+            kind=lambda f, column=column: f[column].map(kind),
+        )
+        for parts, column in ((rows, "case"), (facts, "scene"))
+    )  # type: ignore[return-value]
+
+
+def markdown(head: list[str], lines: list[list[str]]) -> str:
+    """A Markdown table, numbers to the right."""
+    return "".join(f"| {' | '.join(line)} |\n" for line in [head, ["---", *["---:"] * (len(head) - 1)], *lines])
+
+
+def by_method(frame: pd.DataFrame, runs: tuple[str, ...], cell: Callable[[pd.DataFrame], str], what: str = "") -> str:
+    """One row per method, one column per kind of recording and run."""
+    columns = [(one, run) for one in ("fragments", "episodes") for run in runs]
+    groups = dict(list(frame.groupby(["method", "kind", "run"])))
+    lines = [[method, *(cell(groups[method, *column]) for column in columns)] for method in METHODS]
+    return markdown([what, *(f"{one}: {run}" for one, run in columns)], lines)
+
+
+def failures(rows: pd.DataFrame) -> str:
+    """Failures, of them those by hitting the leader, of the cases that are not censored."""
+    by_leader = int((rows["failure_kind"] == "host_into_leader").sum())
+    return f"{int(rows['failed'].sum())}{f' ({by_leader})' if by_leader else ''} of {int((~rows['censored']).sum())}"
+
+
+def means(rows: pd.DataFrame) -> str:
+    """Mean delay and hardest braking."""
+    return f"{rows['delay_s'].mean():.1f} / {rows['hardest_braking'].mean():.1f}"
+
+
+def gaps(rows: pd.DataFrame) -> str:
+    """Median and smallest of the smallest gaps to leader and follower."""
+    found = [rows[name].dropna() for name in ("min_leader_gap_m", "min_follower_gap_m")]
+    return " / ".join(f"{gap.median():.1f} ({gap.min():.1f})" for gap in found)
+
+
+def through(facts: pd.DataFrame) -> str:
+    """Cars that drove into the host, and scenes with such."""
+    return f"{int(facts['driven_through'].sum())} in {int((facts['driven_through'] > 0).sum())}"
+
+
+def handed(facts: pd.DataFrame) -> str:
+    """Cars handed to SUMO, and kept out, per scene."""
+    return f"{facts['released'].mean():.1f} / {facts['blocked'].mean():.1f}"
+
+
+def replay(data: Path) -> SceneReplay:
+    """All cases."""
+    (batch,) = plan(SweepRequest(["us101-scene"], ["acc"], data=data, source="ngsim"))
+    assert isinstance(batch, SceneReplay)
+    return batch
+
+
+def starts(batch: SceneReplay) -> str:
+    """Time gaps of the hosts to their leaders at the start."""
+    plant = batch.open(Ramp.load(batch.scenario.ramp))
+    found: dict[str, list[float]] = {"fragments": [], "episodes": []}
+    for number in range(len(batch)):
+        plant.place(np.array([0]), batch.encounters, np.array([number]))
+        gap = plant.neighbours.leader_gap / float(plant.host_speed[0])
+        found[kind(batch.case(number))].append(gap)
+    plant.close()
+    lines = []
+    for name, gaps in found.items():
+        led = np.array([gap for gap in gaps if np.isfinite(gap)])
+        below = [str(int((led < limit).sum())) for limit in (1.0, 1.5)]
+        lines.append([name, str(len(gaps)), str(len(led)), f"{np.median(led):.1f}", *below])
+    return markdown(["", "cases", "with a leader", "its time gap, median [s]", "below 1 s", "below 1.5 s"], lines)
+
+
+def fullness(batch: SceneReplay) -> str:
+    """The recordings that hold test pairs: their length, cars, cars at a time, and pairs."""
+    lines = []
+    for name, places in groups(batch):
+        scenes = list({scene.recording: scene for scene, _ in places}.values())
+        at_start = [len(scene.present(pair.start)) for scene, pair in places]
+        lengths = np.array([scene.cycles / 10 for scene in scenes])
+        cars = np.array([len(scene) for scene in scenes])
+        missing = sum(int(scene.length_missing.sum()) for scene in scenes)
+        seconds, count = (f"{v.min():.0f}" if len(v) == 1 else f"{v.min():.0f}–{v.max():.0f}" for v in (lengths, cars))
+        lines.append([name, str(len(places)), seconds, count, f"{np.mean(at_start):.1f}", f"{missing} of {cars.sum()}"])
+    return markdown(
+        ["recording", "test pairs", "length [s]", "cars", "cars at a pair's start, mean", "without a length"], lines
+    )
+
+
+def groups(batch: SceneReplay) -> Iterator[tuple[str, list]]:
+    """The places of each fragment, and of all episodes together."""
+    named: dict[str, list] = {}
+    for place in batch.places:
+        name = place[0].recording
+        named.setdefault("episodes" if name.startswith("episode") else name, []).append(place)
+    yield from sorted(named.items(), key=lambda item: (item[0] == "episodes", item[0]))
+
+
+def main() -> None:
+    """Fill the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True, help="folder with real NGSIM files")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the sweeps")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    given = parser.parse_args()
+    rows, facts = run_all(given.data, given.out, given.jobs)
+    batch = replay(given.data)
+    tables = {
+        "fullness": fullness(batch),
+        "starts": starts(batch),
+        "failures": by_method(rows, tuple(RUNS.values()), failures),
+        "means": by_method(rows, (ALONE, LOG, RELEASED), means),
+        "gaps": by_method(rows, (LOG, RELEASED), gaps),
+        "through": by_method(facts, (BLIND, LOG, RELEASED), through),
+        "released": by_method(facts, (RELEASED,), handed),
+    }
+
+    def fill(block: re.Match[str]) -> str:
+        return f"<!-- table: {block['name']} -->\n\n{tables[block['name']]}\n<!-- end -->"
+
+    PAGE.write_text(BLOCK.sub(fill, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
