@@ -11,6 +11,9 @@ from typing import Any
 
 from merge_cosim.bench.loops import compare, highway
 from merge_cosim.bench.scaling import scaling
+from merge_cosim.bench.scenes import METHOD as SCENE_METHOD
+from merge_cosim.bench.scenes import SCENARIO as SCENE_SCENARIO
+from merge_cosim.bench.scenes import scene_costs
 from merge_cosim.bench.updates import estimator_costs
 from merge_cosim.experiments.plan import versions
 
@@ -38,6 +41,12 @@ UPDATES = """## One update of each estimator
 
 Microseconds per encounter, in a full batch and alone.
 """
+SCENES = """## Living traffic
+
+`{scenario}` on {copies} copies of the ramp in one process, three minutes from empty, hosts driven by `{method}`. The
+real-time factor is simulated time over wall time of the whole loop, observing, estimating and commanding included; `cars`
+is the mean over the run.
+"""
 SCALING = """## Whole sweeps by cases and processes
 
 `designed-random` under `acc`. `run_s` is the time with all processes at work, their start included; `loop_ms_per_case`
@@ -46,7 +55,12 @@ is the time in the loops, summed over processes; `peak_mib` is the largest proce
 
 
 def bench(
-    cases: int = 2_000, sample: int = 100, rounds: int = 5, largest: int = 100_000, jobs: int | None = None
+    cases: int = 2_000,
+    sample: int = 100,
+    rounds: int = 5,
+    largest: int = 100_000,
+    jobs: int | None = None,
+    copies: int = 16,
 ) -> dict[str, Any]:
     """Take all figures.
 
@@ -56,6 +70,7 @@ def bench(
         rounds: How often each is timed.
         largest: Cases of the largest sweep; those of a tenth and a hundredth are run, too.
         jobs: Processes of the sweeps on several; one per core by default.
+        copies: Copies of the ramp that living traffic is timed on.
     """
     several = jobs or os.cpu_count() or 1
     sizes = sorted({max(1, largest // 100), max(1, largest // 10), largest})
@@ -67,6 +82,8 @@ def bench(
         **compare(cases, sample, rounds),
         "highway_env": highway(),
         "estimators": estimator_costs(rounds),
+        "copies": copies,
+        "scenes": scene_costs(copies),
         "scaling": scaling(sizes, sorted({1, several})),
     }
 
@@ -115,7 +132,12 @@ def page(found: Mapping[str, Any], command: str) -> str:
             f"For scale, another simulator with other models: `merge-v0` of highway-env {theirs['version']} makes "
             f"{theirs['steps_per_s']:,} simulated steps, {theirs['vehicle_steps_per_s']:,} vehicle-steps, per second.\n"
         )
-    parts += [UPDATES, _table(found["estimators"]), SCALING, _table(found["scaling"])]
+    parts += [UPDATES, _table(found["estimators"])]
+    parts += [
+        SCENES.format(scenario=SCENE_SCENARIO, method=SCENE_METHOD, copies=found["copies"]),
+        _table(found["scenes"]),
+    ]
+    parts += [SCALING, _table(found["scaling"])]
     largest = found["scaling"][-1]
     for alone in found["scaling"]:
         if alone["cases"] == largest["cases"] and alone is not largest:

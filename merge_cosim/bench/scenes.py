@@ -11,19 +11,22 @@ SCENARIO, METHOD = "traffic-dense", "pgm"
 MODELS = ("Krauss", "IDM", "EIDM")
 SETTINGS = {
     "encounters.replications": 1,
-    "encounters.demand.copies": 16,
     "encounters.demand.duration": 180.0,
     "encounters.demand.warm_up": 30.0,
 }
 
 
-def scene_costs() -> list[dict[str, Any]]:
-    """A row per car-following model: cars on average, real-time factor of the whole loop, share of SUMO's steps."""
-    return [_cost(model) for model in MODELS]
+def scene_costs(copies: int) -> list[dict[str, Any]]:
+    """A row per car-following model: cars on average, real-time factor of the whole loop, share of SUMO's steps.
+
+    Args:
+        copies: Copies of the ramp; about 140 cars drive on each.
+    """
+    return [_cost(model, copies) for model in MODELS]
 
 
-def _cost(model: str) -> dict[str, Any]:
-    settings = SETTINGS | {"encounters.demand.car_following": model}
+def _cost(model: str, copies: int) -> dict[str, Any]:
+    settings = SETTINGS | {"encounters.demand.car_following": model, "encounters.demand.copies": copies}
     (task,) = plan(SweepRequest([SCENARIO], [METHOD], settings=settings))
     assert isinstance(task, SceneBatch)
     with task.scene(0) as scene:

@@ -108,14 +108,17 @@ def bench(
     rounds: Annotated[int, typer.Option(min=1, help="How often each is timed; the median counts.")] = 5,
     largest: Annotated[int, typer.Option(min=1, help="Cases of the largest sweep.")] = 100_000,
     jobs: Jobs = None,
+    copies: Annotated[int, typer.Option(min=1, help="Copies of the ramp that living traffic is timed on.")] = 16,
     page: Annotated[Path | None, typer.Option(help="Write the figures as a page in Markdown, too.")] = None,
     json: Json = False,
 ) -> None:
-    """Time the loop, its alternatives, every estimator, and sweeps by cases and processes."""
+    """Time the loop, its alternatives, every estimator, living traffic, and sweeps by cases and processes."""
     from merge_cosim.bench import bench as figures
 
-    found = figures.bench(cases, sample, rounds, largest, jobs)
-    command = f"merge-cosim bench --cases {cases} --sample {sample} --rounds {rounds} --largest {largest}"
+    found = figures.bench(cases, sample, rounds, largest, jobs, copies)
+    command = (
+        f"merge-cosim bench --cases {cases} --sample {sample} --rounds {rounds} --largest {largest} --copies {copies}"
+    )
     if page is not None:
         figures.write_page(page, found, command)
     if json:

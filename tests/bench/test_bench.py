@@ -13,7 +13,22 @@ from merge_cosim.intention.base import estimators
 
 @pytest.mark.slow
 def test_every_figure_is_there_and_on_the_page(tmp_path):
-    arguments = ("--cases", 400, "--sample", 60, "--rounds", 1, "--largest", 300, "--jobs", 2, "--page", "bench.md")
+    arguments = (
+        "--cases",
+        400,
+        "--sample",
+        60,
+        "--rounds",
+        1,
+        "--largest",
+        300,
+        "--jobs",
+        2,
+        "--copies",
+        1,
+        "--page",
+        "bench.md",
+    )
     done = merge_cosim("bench", *arguments, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr  # it fails if an alternative's outcomes are not ours
     found = json.loads(done.stdout)
@@ -24,6 +39,8 @@ def test_every_figure_is_there_and_on_the_page(tmp_path):
     assert [(row["cases"], row["processes"]) for row in found["scaling"]] == [
         (cases, jobs) for cases in (3, 30, 300) for jobs in (1, 2)
     ]
+    assert [row["model"] for row in found["scenes"]] == ["Krauss", "IDM", "EIDM"]
+    assert all(row["real_time_factor"] > 0 and row["meetings"] > 0 for row in found["scenes"])
     assert all(row["peak_mib"] > 50 for row in found["scaling"])
     page = (tmp_path / "bench.md").read_text()
     alone, both = found["scaling"][-2:]
