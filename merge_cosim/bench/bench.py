@@ -44,8 +44,8 @@ Microseconds per encounter, in a full batch and alone.
 SCENES = """## Living traffic
 
 `{scenario}` on {copies} copies of the ramp in one process, three minutes from empty, hosts driven by `{method}`. The
-real-time factor is simulated time over wall time of the whole loop, observing, estimating and commanding included; `cars`
-is the mean over the run.
+real-time factor is simulated time over wall time of the whole loop, observing, estimating and commanding included;
+`cars` is the mean over the run.
 """
 SCALING = """## Whole sweeps by cases and processes
 
