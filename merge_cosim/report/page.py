@@ -11,7 +11,7 @@ import pandas as pd
 
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.statistics.comparison import reference_of
-from merge_cosim.experiments.statistics.summary import ALL_SITES, GROUP, compare_all
+from merge_cosim.experiments.statistics.summary import ALL_SITES, GROUP, TRAFFIC, compare_all
 from merge_cosim.experiments.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, TRACES, ResultFolder
 from merge_cosim.report import case_figures, collisions, measure_tables, set_figures, tables
 from merge_cosim.report.columns import Table
@@ -234,5 +234,7 @@ def _head(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, str]:
         "Wall time": f"{manifest['wall_s']:,.1f} s with {manifest['command']['jobs']} process(es)",
         "Speed": f"{manifest['vehicle_steps_per_s'] or 0:,} vehicle-steps per second; "
         f"{manifest['ratio_to_bare_sumo']} times the wall time of bare SUMO",
-        "SUMO's stations": f"at most {manifest['worst_station_difference_m']:.1e} m from the closed form",
+        "SUMO's stations": f"at most {manifest['worst_station_difference_m']:.1e} m from the closed form"
+        if sources != [TRAFFIC]
+        else "the only ones: other cars have no closed form",
     }
