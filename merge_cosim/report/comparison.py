@@ -10,6 +10,7 @@ import pandas as pd
 
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.statistics.comparison import mcnemar
+from merge_cosim.experiments.statistics.summary import TRAFFIC
 from merge_cosim.experiments.store import MANIFEST, ResultFolder
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order, is_reference
@@ -34,9 +35,13 @@ def compare(first: Path, second: Path) -> tuple[Table, list[str]]:
     """
     folders = [ResultFolder(path) for path in (first, second)]
     frames = [folder.results().to_pandas() for folder in folders]
-    both = frames[0].merge(frames[1], on=[*GROUP, "case"], suffixes=("_a", "_b"))
+    paired = [frame[frame["source"] != TRAFFIC] for frame in frames]
+    both = paired[0].merge(paired[1], on=[*GROUP, "case"], suffixes=("_a", "_b"))
     if both.empty:
-        raise UserError(f"{first} and {second}: they have no case of the same scenario and method in common")
+        raise UserError(
+            f"{first} and {second}: they have no case of the same scenario and method in common (meetings in living "
+            "traffic are never the same: see the intervals of each)"
+        )
     rows = [
         dict(zip(GROUP, key, strict=True)) | _row(part) for key, part in both.groupby(GROUP, sort=False, observed=True)
     ]

@@ -137,6 +137,9 @@ def test_a_report_of_living_traffic(minute):
     assert "SUMO&#39;s own traffic" in page or "SUMO's own traffic" in page
     assert "The traffic as a whole" in page
     assert (out / "tables" / "traffic.csv").is_file()
+    compared = merge_cosim("compare", out, out, cwd=folder)
+    assert compared.returncode == 2
+    assert "meetings in living traffic are never the same" in compared.stderr
 
 
 def test_route_files_of_ones_own_just_run(tmp_path):
