@@ -130,7 +130,7 @@ def _sum_up(
     }
     parts: dict[str, list[pd.DataFrame]] = {name: [] for name in (SUMMARY_CSV, STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV)}
     for group in folder.groups():
-        rows = folder.rows_of(*group)
+        rows = folder.rows_of(*group).to_pandas()
         parts[SUMMARY_CSV].append(summarise(rows, cycle_us, against))
         parts[STRATA_CSV].append(strata(rows, against))
         parts[BELIEF_CSV].append(belief(rows))

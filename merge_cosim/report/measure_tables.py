@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import pandas as pd
-import pyarrow as pa
 
-from merge_cosim.experiments.outcome import SCHEMA
 from merge_cosim.experiments.statistics import belief
 from merge_cosim.experiments.statistics.summary import ALL_STARTS
 from merge_cosim.report.columns import Column, Table
@@ -62,8 +60,7 @@ def safety_table(summary: pd.DataFrame, section: Section) -> Table:
 
 def belief_table(results: pd.DataFrame, section: Section) -> Table | None:
     """Beliefs by distance of the merging car, in closed loop; None where no case has a label."""
-    rows = section.of(results)
-    found = belief(pa.Table.from_pandas(rows, schema=SCHEMA, preserve_index=False))
+    found = belief(section.of(results))
     if not len(found):
         return None
     found = found[found["start"] == ALL_STARTS]

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import expit
 from scipy.stats import bootstrap
-from test_summaries import table
+from test_summaries import frame
 
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.statistics import belief, calibration, strata, summarise
@@ -46,12 +46,12 @@ def test_discordant_cases_are_those_that_both_carry_to_the_end():
         for case in "abcdefgh"
     ]
     rows[0] |= {"failed": False, "censored": True}  # case a under 'this'
-    summary = summarise(table(*rows), {}, against="other").set_index("method")
+    summary = summarise(frame(*rows), {}, against="other").set_index("method")
     row = summary.loc["this"]
     assert (row["only_this_fails"], row["only_other_fails"]) == (1, 2)  # b; d and e
     assert row["mcnemar_p"] == pytest.approx(1.0)
     assert pd.isna(summary.loc["other", "only_this_fails"])
-    grid = summarise(table(*(row | {"source": "designed"} for row in rows)), {}, against="other").set_index("method")
+    grid = summarise(frame(*(row | {"source": "designed"} for row in rows)), {}, against="other").set_index("method")
     assert grid.loc["this", "only_other_fails"] == 2
     assert pd.isna(grid.loc["this", "mcnemar_p"])
 
@@ -139,7 +139,7 @@ def labelled(n=200, seed=0):
 
 
 def test_belief_rows_by_gate_and_start():
-    rows = table(*labelled(), {"case": "unlabelled", "method": "m", "log_odds_40": 1.0})
+    rows = frame(*labelled(), {"case": "unlabelled", "method": "m", "log_odds_40": 1.0})
     found = belief(rows)
     assert set(found["gate_m"]) == {40}
     assert found.set_index("start")["n"].to_dict() == {"all": 200, "[0, 1) s": 50, "[1, 3) s": 100, ">= 3 s": 50}
@@ -151,27 +151,27 @@ def test_belief_rows_by_gate_and_start():
     assert whole["calibration_error"] == pytest.approx(
         (bins["n"] * (bins["mean_belief"] - bins["not_yield_share"]).abs()).sum() / 200, abs=1e-5
     )
-    assert not len(belief(table({"case": "x", "method": "m"})))
+    assert not len(belief(frame({"case": "x", "method": "m"})))
 
 
 def test_stable_decisions_are_counted_among_labelled_cases():
     rows = labelled()
-    row = summarise(table(*rows), {}).iloc[0]
+    row = summarise(frame(*rows), {}).iloc[0]
     stable = sum(one["first_stable_s"] is not None for one in rows)
     assert (row["labelled"], row["first_stable_pct"], row["first_stable_s"]) == (200, stable / 2, 1.0)
 
 
 def test_strata_are_summaries_of_their_cases():
-    parts = strata(table(*labelled())).set_index("start")
+    parts = strata(frame(*labelled())).set_index("start")
     assert parts["n"].to_dict() == {"[0, 1) s": 50, "[1, 3) s": 100, ">= 3 s": 50}
 
 
 def test_cars_with_several_cases_get_a_clustered_interval():
     rows = [{"case": str(i), "car": str(i // 2), "method": "m", "failed": i < 6} for i in range(40)]
-    row = summarise(table(*rows), {}).iloc[0]
+    row = summarise(frame(*rows), {}).iloc[0]
     assert row["cars"] == 20
     assert row["cluster_low_pct"] <= row["failure_pct"] <= row["cluster_high_pct"]
     assert row["cluster_high_pct"] - row["cluster_low_pct"] > row["ci_high_pct"] - row["ci_low_pct"] - 5
-    single = summarise(table(*(one | {"car": one["case"]} for one in rows)), {}).iloc[0]
+    single = summarise(frame(*(one | {"car": one["case"]} for one in rows)), {}).iloc[0]
     assert pd.isna(single["cluster_low_pct"])
     assert single["distance_low_m"] == single["distance_high_m"] == 10.0

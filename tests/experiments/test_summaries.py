@@ -39,8 +39,10 @@ BASE = dict.fromkeys(SCHEMA.names) | {
 }
 
 
-def table(*rows):
-    return pa.Table.from_pandas(pd.DataFrame([BASE | row for row in rows]), schema=SCHEMA, preserve_index=False)
+def frame(*rows):
+    """Result rows as pandas reads them from a sweep's file."""
+    table = pa.Table.from_pandas(pd.DataFrame([BASE | row for row in rows]), schema=SCHEMA, preserve_index=False)
+    return table.to_pandas()
 
 
 def test_rates_and_bounds():
@@ -49,7 +51,7 @@ def test_rates_and_bounds():
     rows[1] |= {"failed": True, "failure_kind": "merging_into_host"}
     rows[2] |= {"censored": True}
     rows[3] |= {"censored": True}
-    row = summarise(table(*rows), {"m": (1.0, 20.0)}).iloc[0]
+    row = summarise(frame(*rows), {"m": (1.0, 20.0)}).iloc[0]
     assert (row["n"], row["failures"], row["censored"]) == (8, 2, 2)
     assert row["failure_pct"] == 25.0
     assert row["failure_pct_best"] == 20.0
@@ -64,7 +66,7 @@ def test_rates_and_bounds():
 
 
 def test_oracle_best_takes_the_safe_one_then_the_quick_one():
-    rows = table(
+    rows = frame(
         {"case": "a", "method": "always-go", "failed": True, "delay_s": 0.0},
         {"case": "a", "method": "always-yield", "delay_s": 9.0},
         {"case": "b", "method": "always-go", "delay_s": 0.5},
@@ -72,14 +74,14 @@ def test_oracle_best_takes_the_safe_one_then_the_quick_one():
         {"case": "c", "method": "always-go"},  # its rival was not run
         {"case": "a", "method": "acc"},
     )
-    best = oracle_best(rows).to_pandas().set_index("case")
+    best = oracle_best(pa.Table.from_pandas(rows, schema=SCHEMA, preserve_index=False)).to_pandas().set_index("case")
     assert best["delay_s"].to_dict() == {"a": 9.0, "b": 0.5}
     assert set(best["method"]) == {"oracle-best"}
 
 
 def test_unnecessary_yields_need_a_safe_first_passage_of_always_go():
     go = {"method": "always-go", "gap_m": 2.0}
-    rows = table(
+    rows = frame(
         {"case": "possible", **go},
         {"case": "close", **go, "gap_m": 1.9},
         {"case": "failing", **go, "failed": True},
@@ -89,19 +91,19 @@ def test_unnecessary_yields_need_a_safe_first_passage_of_always_go():
     summary = summarise(rows, {}).set_index("method")
     assert summary.loc["m", "unnecessary_yields"] == 1
     assert summary.loc["always-go", "unnecessary_yields"] == 0
-    alone = summarise(table({"case": "x", "method": "m"}, {"case": "y", "method": "m", "host_first": False}), {}).iloc[
+    alone = summarise(frame({"case": "x", "method": "m"}, {"case": "y", "method": "m", "host_first": False}), {}).iloc[
         0
     ]
     assert pd.isna(alone["unnecessary_yields"])
 
 
 def test_sites_are_pooled_only_within_one_source():
-    one = table({"case": "a", "method": "m"}, {"case": "b", "method": "m", "site": "i80"})
+    one = frame({"case": "a", "method": "m"}, {"case": "b", "method": "m", "site": "i80"})
     assert summarise(one, {})["site"].tolist() == ["all", "i80", "us101"]
-    two = table({"case": "a", "method": "m"}, {"case": "b", "method": "m", "site": "i80", "source": "surrogate"})
+    two = frame({"case": "a", "method": "m"}, {"case": "b", "method": "m", "site": "i80", "source": "surrogate"})
     assert summarise(two, {})["site"].tolist() == ["i80", "us101"]
 
 
 def test_a_fixed_grid_has_no_interval():
-    row = summarise(table({"case": "a", "method": "m", "source": "designed"}), {}).iloc[0]
+    row = summarise(frame({"case": "a", "method": "m", "source": "designed"}), {}).iloc[0]
     assert pd.isna(row["ci_low_pct"])

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 
 from merge_cosim.cosim.decisions import GATES
 from merge_cosim.experiments.statistics.summary import ALL_STARTS, GROUP, by_start, with_all_sites
@@ -17,7 +16,7 @@ BINS = 10
 """Bins of P(NOT_YIELD) by which calibration is judged."""
 
 
-def belief(rows: pa.Table) -> pd.DataFrame:
+def belief(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per group, start (all, and by ambiguity) and gate; empty where no case has a label.
 
     `n` cases have a label and pass the gate undecided. A rule without doubt has an accuracy alone; `auc_arrival` is the
@@ -35,7 +34,7 @@ def belief(rows: pa.Table) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-def calibration(rows: pa.Table) -> pd.DataFrame:
+def calibration(rows: pd.DataFrame) -> pd.DataFrame:
     """Counts, mean belief and observed share of NOT_YIELD by bin of belief: one row per group, gate and filled bin."""
     found = []
     for key, start, group in _groups(rows):
@@ -87,9 +86,8 @@ def auc(score: FloatArray, truth: BoolArray) -> float | None:
     return round(float(roc_auc_score(truth, np.nan_to_num(score))), 6) if 0 < truth.sum() < len(truth) else None
 
 
-def _groups(rows: pa.Table) -> Iterator[tuple[dict[str, str], str, pd.DataFrame]]:
-    frame = rows.to_pandas()
-    frame = frame[frame["label"] != ""]
+def _groups(rows: pd.DataFrame) -> Iterator[tuple[dict[str, str], str, pd.DataFrame]]:
+    frame = rows[rows["label"] != ""]
     for key, group in with_all_sites(frame).groupby(GROUP, sort=True):
         names = dict(zip(GROUP, map(str, key), strict=True))
         yield names, ALL_STARTS, group

@@ -43,26 +43,23 @@ def oracle_best(rows: pa.Table) -> pa.Table:
 
 
 def summarise(
-    rows: pa.Table, cycle_us: Mapping[str, tuple[float, float | None]], against: str | None = None
+    rows: pd.DataFrame, cycle_us: Mapping[str, tuple[float, float | None]], against: str | None = None
 ) -> pd.DataFrame:
     """One row per (scenario, variation, site, source, method), sorted by them.
 
     A scenario with several sites also gets a row over all of them where they have the same source (site `all`).
 
     Args:
-        rows: Result rows.
+        rows: Result rows, as pandas reads them.
         cycle_us: For each method the time of one update per encounter in a full batch, and in a batch of one [us].
         against: Method that the others are compared with on the same cases; None for none.
     """
-    frame = rows.to_pandas()
-    frame["unnecessary_yield"] = _unnecessary_yields(frame)
-    return _summaries(frame, cycle_us, against)
+    return _summaries(_with_yields(rows), cycle_us, against)
 
 
-def strata(rows: pa.Table, against: str | None = None) -> pd.DataFrame:
+def strata(rows: pd.DataFrame, against: str | None = None) -> pd.DataFrame:
     """The same for the cases of each ambiguity at the start, with the column `start`; variations are left out."""
-    frame = rows.to_pandas()
-    frame["unnecessary_yield"] = _unnecessary_yields(frame)
+    frame = _with_yields(rows)
     parts = by_start(frame[frame["variation"] == ""])
     found = [_summaries(part, {}, against).assign(start=start) for start, part in parts if len(part)]
     return pd.concat(found, ignore_index=True) if found else pd.DataFrame()
@@ -183,6 +180,10 @@ def _intervals(group: pd.DataFrame) -> dict[str, Any]:
         rate = (None, None)
     ends = (None if end is None else round(end, 4) for end in (*rate, *distance))
     return {"cars": clusters.nunique() if logged else None, **dict(zip(names, ends, strict=True))}
+
+
+def _with_yields(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.assign(unnecessary_yield=_unnecessary_yields(rows))
 
 
 def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
