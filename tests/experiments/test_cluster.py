@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from command import merge_cosim, small_scenario
+from scene_files import small_scene
 
 import merge_cosim as merge_cosim_package
 
@@ -115,12 +116,13 @@ def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path)
 
 @pytest.mark.slow
 def test_a_local_cluster_gives_the_same_bytes(tmp_path):
-    scenario = small_scenario(tmp_path)
+    scenarios = small_scenario(tmp_path), small_scene(tmp_path)
     for out, where in (("here", ()), ("there", ("--dask", "local"))):
-        done = merge_cosim("sweep", scenario, "--method", "pgm", *where, "--jobs", 2, "--out", out, cwd=tmp_path)
+        done = merge_cosim("sweep", *scenarios, "--method", "pgm", *where, "--jobs", 2, "--out", out, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
-    assert (tmp_path / "there/results.parquet").read_bytes() == (tmp_path / "here/results.parquet").read_bytes()
+    for name in ("results.parquet", "scenes.csv", "notes.csv"):
+        assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes(), name
 
 
 def test_no_scheduler_is_one_line(tmp_path):
