@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from merge_cosim.experiments.statistics.rates import wilson
 from merge_cosim.report.methods import in_order
 
 SCENARIOS = ("traffic-light", "traffic-dense", "traffic-stop-and-go")
@@ -41,11 +42,13 @@ def main() -> None:
     summary = pd.read_json(folder / "summary.json")
     traffic = pd.read_csv(folder / "traffic.csv")
     manifest = json.loads((folder / "manifest.json").read_text())
-    parts = ["```", " ".join(command("OUT")).replace(" --method", " \\\n    --method", 1), "```", ""]
+    shown = " ".join(command("OUT")).replace(" --method", " \\\n    --method", 1).replace(" --out", " \\\n    --out")
+    parts = ["```", shown, "```", ""]
     parts.append(
         f"{int(traffic['scenes'].sum())} scenes, {manifest['real_time_factor']:.0f} times real time in each of "
         f"{manifest['command']['jobs']} processes."
     )
+    parts += ["", "### All three together", "", *together(summary, traffic)]
     for scenario in SCENARIOS:
         parts += ["", f"### {scenario}", ""]
         parts += table(summary[summary["scenario"] == scenario], traffic[traffic["scenario"] == scenario])
@@ -53,6 +56,20 @@ def main() -> None:
     head, _, rest = text.partition(BEGIN)
     _, _, tail = rest.partition(END)
     PAGE.write_text(head + BEGIN + "\n".join(parts) + "\n" + END + tail, encoding="utf-8")
+
+
+def together(summary: pd.DataFrame, traffic: pd.DataFrame) -> list[str]:
+    """Failures, stopped merging cars and contacts of hosts, by method."""
+    lines = ["| method | failures of n (Wilson 95 %) | merging car stopped | contacts of hosts |", "|---" * 4 + "|"]
+    failures = summary.groupby("method")[["failures", "n"]].sum()
+    whole = traffic.groupby("method")[["merging_stopped", "meetings", "host_contacts"]].sum().astype(int)
+    for method in in_order(summary["method"]):
+        failed, n = failures.loc[method]
+        low, high = wilson(int(failed), int(n))
+        one = whole.loc[method]
+        stopped = f"{one['merging_stopped']} of {one['meetings']}"
+        lines.append(f"| {method} | {failed} of {n} ({low:.1f}–{high:.1f} %) | {stopped} | {one['host_contacts']} |")
+    return lines
 
 
 def table(summary: pd.DataFrame, traffic: pd.DataFrame) -> list[str]:
