@@ -17,6 +17,8 @@ SPEED_MODE_UNCHECKED = 32
 """SUMO drives the commanded speed exactly: no safe-speed, right-of-way or acceleration check."""
 LANE_CHANGE_MODE_NONE = 0
 """SUMO changes no lane by itself."""
+SPEED_MODE_SUMO, LANE_CHANGE_MODE_SUMO = 31, 1621
+"""What SUMO sets itself: it checks everything, and changes lanes as its models wish."""
 _VIEW, _ZOOM = "View #0", 1500.0
 
 

@@ -28,7 +28,8 @@ from merge_cosim.cosim.scoring import Rules
 from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
 from merge_cosim.ngsim.rules import PairRules
-from merge_cosim.ramps.route_reader import Configuration, only_pairs
+from merge_cosim.ramps.configuration import Configuration
+from merge_cosim.ramps.route_reader import only_pairs
 from merge_cosim.registry import did_you_mean, parameters
 from merge_cosim.traffic.base import MergingCar, merging_cars
 from merge_cosim.traffic.demand import Demand
@@ -200,7 +201,7 @@ class Routes(_Strict):
         replications: Number of scenes, each with a SUMO seed of its own.
         seed: SUMO's seed of the first one.
         end: Where a scene ends [s]; 0 for the configuration's own end.
-        host: A vehicle or a type that is a host without saying so.
+        host: A vehicle, flow or type that is a host without saying so.
         attention: Which merging cars a host attends to.
     """
 

@@ -85,4 +85,3 @@ def _definition(
         extensions=Extensions(**layout.surveyed),
         sources=sources,
     )
-

@@ -100,7 +100,6 @@ def _listed(net: sumolib.net.Net, upstream: float, downstream: float) -> str:
     return f"{len(shown)} on-ramps; choose one with --link: {', '.join(shown)}"
 
 
-
 def sources_of(joint: Joint, path: Course, length: float, origin: Origin, given: str | None) -> dict[str, str]:
     """Where each fact of a ramp but its geometry comes from, in words.
 
@@ -112,8 +111,9 @@ def sources_of(joint: Joint, path: Course, length: float, origin: Origin, given:
         given: The command to which the user has given the speed limit; None if it is the net's.
     """
     file, link, gore = origin.file.name, joint.link, path.main[path.before]
+    kind = link.getType() or "no type"
     sources = {
-        "ramp": f"{file}: edge {link.getID()} ({link.getType() or 'no type'}) joins {joint.through.getID()} at the gore.",
+        "ramp": f"{file}: edge {link.getID()} ({kind}) joins {joint.through.getID()} at the gore.",
         "merging_point": "Default: a fifth of the acceleration lane." if path.beside else "The gore.",
         "speed_limit": f"{file}: lane {gore.getID()}.",
     }
