@@ -162,6 +162,7 @@ def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], a
         api, errors = attached_to(attach, conditions)
         refuse_other_net(api, scene.ramp.net, {*scene.ramp.main_route, *scene.ramp.ramp_route}, attach)
     elif gui_delay is None:
+        words += ["--remote-port", "0"]  # SUMO would wait there for somebody
         api, errors = libsumo_started(words, scene.file)
     else:
         words += ["--delay", str(gui_delay)]
