@@ -300,6 +300,8 @@ class Scenario(_Strict):
         return self.merging.get("model") == "replay"
 
 
+SUMO_SUFFIXES = (".sumocfg", ".cfg")
+"""Endings of SUMO's configurations; the second is what older ones are called."""
 SECTIONS = ("ramp", "encounters", "merging", "full_scene", "test", "speed_limit")
 """What of a scenario can be set or varied from the command line."""
 
@@ -322,7 +324,7 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
         if file.suffix:
             raise UserError(f"{file}: no such scenario file")
         raise UserError(f"unknown scenario '{name_or_file}'{did_you_mean(name_or_file, scenario_names())}")
-    document = _of_sumocfg(file) if file.suffix == ".sumocfg" else _of_toml(file)
+    document = _of_sumocfg(file) if file.suffix in SUMO_SUFFIXES else _of_toml(file)
     for name, value in (settings or {}).items():
         _set(document, name, value)
     try:

@@ -73,6 +73,12 @@ def notes(folder: Path) -> list[str]:
         found.append(f"{file.net}: no georeference: no map can be put behind it (<location> in the .nod.xml gives one)")
     if not file.described and not list(folder.glob("*.netccfg")):
         found.append("no *.netccfg: the ramp can be used, but neither edited nor rebuilt")
+    gore = net.getEdge(file.gore).getFromNode()
+    if not ramp.changes_lane and gore.getType() == "unregulated":
+        found.append(
+            f"gore: at node '{gore.getID()}' of type 'unregulated' SUMO's own drivers do not see each other: it does for "
+            "encounters, but in living traffic they collide; for that make its type 'zipper' in the .nod.xml"
+        )
     left = ramp.auxiliary_end - ramp.merging_point
     needed = ramp.speed_limit**2 / (2.0 * COMFORTABLE_BRAKING)
     if ramp.speed_limit**2 / (2.0 * HARD_BRAKING) <= left < needed:

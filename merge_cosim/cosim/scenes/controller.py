@@ -72,6 +72,7 @@ class HostController:
         self._open: dict[Meeting, Bank] = {}
         self._met: dict[str, set[str]] = {}
         self._cycle = 0
+        self._teleports = self._teleported()
         self.finished: list[Meeting] = []
         self.notes = Notes()
 
@@ -107,8 +108,15 @@ class HostController:
             if self._roster.role(name) == "host":
                 line = f"host {name} never departed: no room where it was to enter"
                 self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
+        # With time-to-teleport.remove SUMO takes cars out without saying which.
+        for number in range(self._teleported() - self._teleports - self.notes.counts()[Event.TELEPORT]):
+            self.notes.add(Event.TELEPORT, f"removed {number}", "SUMO took out a vehicle that had waited too long")
         if not self.host_count:
             self.notes.add(Event.NO_HOST, "", "no host came in that drives along the main road past the gore")
+
+    def _teleported(self) -> int:
+        """Teleports so far, as SUMO counts them."""
+        return int(self._api.simulation.getParameter("", "stats.teleports.total"))
 
     def _by_leader(
         self, hosts: list[Actor]
