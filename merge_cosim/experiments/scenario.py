@@ -29,6 +29,7 @@ from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
 from merge_cosim.ngsim.rules import PairRules
 from merge_cosim.ramps.configuration import Configuration
+from merge_cosim.ramps.ramp import ramp_names
 from merge_cosim.ramps.route_reader import only_pairs
 from merge_cosim.registry import did_you_mean, parameters
 from merge_cosim.traffic.base import MergingCar, merging_cars
@@ -348,9 +349,12 @@ def _of_toml(file: Path) -> dict[str, Any]:
 
 def _of_sumocfg(file: Path) -> dict[str, Any]:
     configuration = Configuration.read(file)
+    folder = configuration.net.parent
+    if str(folder) in ramp_names():  # a folder of one's own by a shipped ramp's name
+        folder = folder.absolute()
     return {
         "title": f"Route files of {file.name}",
-        "ramp": str(configuration.net.parent),
+        "ramp": str(folder),
         "encounters": {"kind": "routes", "file": str(file)},
         "merging": {"model": "designed" if only_pairs(configuration) else BY_SUMO},
     }

@@ -45,6 +45,16 @@ def test_the_commands_of_the_page(tmp_path: Path) -> None:
     assert found["case"].str.match(r"000/highway1\.\d+/onramp\.\d+").all()
 
 
+def test_a_folder_by_a_shipped_ramps_name_is_ones_own(tmp_path: Path) -> None:
+    game(tmp_path, "ramp")
+    (tmp_path / "ramp").rename(tmp_path / "us101")
+    file = tmp_path / "ramp.sumocfg"
+    file.write_text(file.read_text().replace('"ramp/', '"us101/'))
+    how = ("--case", "000", "--method", "acc", "--set", "encounters.host=highway1", "--set", "encounters.end=30")
+    scene = json.loads(merge_cosim("run", file.name, *how, "--json", cwd=tmp_path).stdout)
+    assert scene["hosts"] > 0
+
+
 def test_a_motorway_from_openstreetmap(tmp_path: Path) -> None:
     """Cars and trucks from seven route files on a net with more than the ramp; the configuration talks and errs."""
     game(tmp_path, "A10KW", "--link", "24498409")
