@@ -77,7 +77,7 @@ def notes(folder: Path) -> list[str]:
     if not ramp.changes_lane and gore.getType() == "unregulated":
         found.append(
             f"gore: at node '{gore.getID()}' of type 'unregulated' SUMO's own drivers do not see each other; "
-            "that is no matter to encounters, but in living traffic they collide: make its type 'zipper' in the .nod.xml"
+            "that is no matter to encounters, but others collide: make its type 'zipper' in the .nod.xml"
         )
     left = ramp.auxiliary_end - ramp.merging_point
     needed = ramp.speed_limit**2 / (2.0 * COMFORTABLE_BRAKING)
