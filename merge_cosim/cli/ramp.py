@@ -109,9 +109,6 @@ def new(
     as_json: Json = False,
 ) -> None:
     """Start a ramp of your own: from a few numbers, a SUMO net, or an extract of OpenStreetMap."""
-    import json
-
-    from merge_cosim.ramps.check import check, notes
     from merge_cosim.ramps.start import start_ramp
 
     numbers = {
@@ -125,9 +122,35 @@ def new(
     }
     given = {key: value for key, value in numbers.items() if value is not None}
     folder, found = start_ramp(out / name, given, from_net, from_osm, link)
+    edit_it = f"Change it with: merge-cosim ramp edit {folder}"
+    _print_found(folder, f"wrote {folder}", found, as_json, edit_it)
+
+
+@app.command("describe")
+def describe(
+    net: Annotated[Path, typer.Argument(metavar="FILE.net.xml", help="A SUMO net with an on-ramp (or .net.xml.gz).")],
+    link: Annotated[
+        str | None, typer.Option(metavar="EDGE", help="An edge of the on-ramp, where the net has several.")
+    ] = None,
+    speed_limit: Annotated[float | None, typer.Option(min=1.0, help="Speed limit [m/s] (the net's).")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write a ramp.toml beside a net of your own, so that its configurations run; the net is left as it is."""
+    from merge_cosim.ramps.describe import describe_ramp
+    from merge_cosim.ramps.start import found
+
+    folder = describe_ramp(net, link, speed_limit)
+    _print_found(folder, f"wrote {folder / 'ramp.toml'}", found(folder), as_json)
+
+
+def _print_found(folder: Path, wrote: str, found: list[str], as_json: bool, *more: str) -> None:
+    """Print what a new `ramp.toml` rests on, and what is to be said of the ramp."""
+    import json
+
+    from merge_cosim.ramps.check import check, notes
+
     problems, remarks = check(folder), notes(folder)
     if as_json:
         print(json.dumps({"folder": str(folder), "found": found, "problems": problems, "notes": remarks}, indent=2))
         return
-    print("\n".join([f"wrote {folder}", *found, *problems, *remarks]))
-    print(f"Change it with: merge-cosim ramp edit {folder}")
+    print("\n".join([wrote, *found, *problems, *remarks, *more]))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import tempfile
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
@@ -17,6 +19,10 @@ SPEED_MODE_UNCHECKED = 32
 """SUMO drives the commanded speed exactly: no safe-speed, right-of-way or acceleration check."""
 LANE_CHANGE_MODE_NONE = 0
 """SUMO changes no lane by itself."""
+SPEED_MODE_SUMO, LANE_CHANGE_MODE_SUMO = 31, 1621
+"""What SUMO sets itself: it checks everything, and changes lanes as its models wish."""
+_NO_REASON = "Process Error"
+"""What libsumo raises where it has told the reason elsewhere."""
 _VIEW, _ZOOM = "View #0", 1500.0
 
 
@@ -240,8 +246,37 @@ def libsumo_started(arguments: Sequence[str], file: Path) -> tuple[Any, Errors]:
     import libsumo
 
     errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
-    _start(lambda: libsumo.start(["sumo", *arguments]), file, errors)
+    with _said() as said:
+        try:
+            libsumo.start(["sumo", *arguments])
+        except errors as error:
+            # Of some mistakes SUMO tells the reason on standard error only.
+            reason = one_line(error)
+            lines = said().splitlines() if reason == _NO_REASON else []
+            reasons = [line.removeprefix("Error: ") for line in lines if line.startswith("Error: ")]
+            raise UserError(f"{file}: SUMO cannot start: {' '.join(reasons) or reason}") from None
+        told = said()
+    sys.stderr.write(told)
     return libsumo, errors
+
+
+@contextmanager
+def _said() -> Iterator[Callable[[], str]]:
+    """Keep back what this process' libraries write to standard error; the function returns it."""
+    sys.stderr.flush()
+    with tempfile.TemporaryFile() as file:
+
+        def said() -> str:
+            file.seek(0)
+            return file.read().decode(errors="replace")
+
+        kept = os.dup(2)
+        os.dup2(file.fileno(), 2)
+        try:
+            yield said
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
 
 
 def traci_started(arguments: Sequence[str], file: Path, gui: bool = False) -> tuple[Any, Errors]:

@@ -57,7 +57,7 @@ class HostListener(traci.StepListener):  # type: ignore[misc]
             model: Model file or name; None for the project's own.
             settings: Parameters by `component.parameter`, as `acc.headway`.
             speed_limit: Speed of a host that nobody hinders [m/s]; None for the ramp's limit.
-            host: A vehicle or type that is a host without saying so.
+            host: A vehicle, flow or type that is a host without saying so.
             attention: Which merging cars a host attends to.
             rules: How meetings are scored.
             seed: Seed of the methods' random streams.

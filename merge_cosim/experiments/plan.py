@@ -31,8 +31,8 @@ from merge_cosim.experiments.statistics.comparison import reference_of
 from merge_cosim.experiments.statistics.summary import TRAFFIC
 from merge_cosim.experiments.work import Batch, Task
 from merge_cosim.intention.model import IntentionModel
+from merge_cosim.ramps.configuration import Configuration
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.ramps.route_reader import Configuration
 from merge_cosim.ramps.routes import ROLE
 from merge_cosim.registry import load_plugin
 from merge_cosim.units import IntArray
@@ -156,7 +156,10 @@ def _scene_batches(
     if isinstance(traffic, Routes):
         if request.dask is not None:
             raise UserError(f"{traffic.file}: route files with traffic run on this machine; leave out --dask")
-        if not traffic.host and not Configuration.read(traffic.file).names_role("host"):
+        configuration = Configuration.read(traffic.file)
+        if traffic.host:
+            configuration.require(traffic.host)
+        elif not configuration.names_role("host"):
             raise UserError(
                 f'{traffic.file}: nobody is the host; add <param key="{ROLE}" value="host"/> to a vType, or name a '
                 f"vehicle or type: --set encounters.host=ID"

@@ -28,7 +28,9 @@ from merge_cosim.cosim.scoring import Rules
 from merge_cosim.errors import UserError
 from merge_cosim.files import shipped
 from merge_cosim.ngsim.rules import PairRules
-from merge_cosim.ramps.route_reader import Configuration, only_pairs
+from merge_cosim.ramps.configuration import Configuration
+from merge_cosim.ramps.ramp import ramp_names
+from merge_cosim.ramps.route_reader import only_pairs
 from merge_cosim.registry import did_you_mean, parameters
 from merge_cosim.traffic.base import MergingCar, merging_cars
 from merge_cosim.traffic.demand import Demand
@@ -200,7 +202,7 @@ class Routes(_Strict):
         replications: Number of scenes, each with a SUMO seed of its own.
         seed: SUMO's seed of the first one.
         end: Where a scene ends [s]; 0 for the configuration's own end.
-        host: A vehicle or a type that is a host without saying so.
+        host: A vehicle, flow or type that is a host without saying so.
         attention: Which merging cars a host attends to.
     """
 
@@ -299,6 +301,8 @@ class Scenario(_Strict):
         return self.merging.get("model") == "replay"
 
 
+SUMO_SUFFIXES = (".sumocfg", ".cfg")
+"""Endings of SUMO's configurations; the second is what older ones are called."""
 SECTIONS = ("ramp", "encounters", "merging", "full_scene", "test", "speed_limit")
 """What of a scenario can be set or varied from the command line."""
 
@@ -321,7 +325,7 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
         if file.suffix:
             raise UserError(f"{file}: no such scenario file")
         raise UserError(f"unknown scenario '{name_or_file}'{did_you_mean(name_or_file, scenario_names())}")
-    document = _of_sumocfg(file) if file.suffix == ".sumocfg" else _of_toml(file)
+    document = _of_sumocfg(file) if file.suffix in SUMO_SUFFIXES else _of_toml(file)
     for name, value in (settings or {}).items():
         _set(document, name, value)
     try:
@@ -345,9 +349,12 @@ def _of_toml(file: Path) -> dict[str, Any]:
 
 def _of_sumocfg(file: Path) -> dict[str, Any]:
     configuration = Configuration.read(file)
+    folder = configuration.net.parent
+    if str(folder) in ramp_names():  # a folder of one's own by a shipped ramp's name
+        folder = folder.absolute()
     return {
         "title": f"Route files of {file.name}",
-        "ramp": str(configuration.net.parent),
+        "ramp": str(folder),
         "encounters": {"kind": "routes", "file": str(file)},
         "merging": {"model": "designed" if only_pairs(configuration) else BY_SUMO},
     }

@@ -25,8 +25,8 @@ from merge_cosim.experiments.statistics.summary import TRAFFIC
 from merge_cosim.experiments.store import with_scene_facts
 from merge_cosim.experiments.work import Task, Workplace, free_law
 from merge_cosim.observation import Setting
+from merge_cosim.ramps.configuration import Configuration
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.ramps.route_reader import Configuration
 from merge_cosim.traffic.demand import write_traffic
 from merge_cosim.units import DT, FloatArray
 

@@ -73,7 +73,7 @@ def _record(run: SceneRun, scene: str) -> pd.DataFrame:
     for meeting in run.meetings:
         if meeting.states:
             part = pd.DataFrame(np.array(meeting.states), columns=list(RECORDED))
-            part.insert(0, "time_s", ((meeting.begin + np.arange(len(part))) * DT).round(9))
+            part.insert(0, "time_s", (run.begin + (meeting.begin + np.arange(len(part))) * DT).round(9))
             part.insert(0, "case", f"{scene}/{meeting.host.name}/{meeting.merging.name}")
             parts.append(part)
     return pd.concat(parts, ignore_index=True)

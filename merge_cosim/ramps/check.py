@@ -47,10 +47,17 @@ def check(folder: Path) -> list[str]:
     own = missing_lanes(net, file)
     if not own:
         ramp = Ramp.from_file(folder, file)
-        own = _order(net, file) + _connections(net, file) + _speeds(net, file) + _lanes(net, file)
-        own += _reach(ramp) + _lane_end(net, file) + _lights(net, file)
-    own += _lengths(net, file) + _extensions(file) + _mapping(net, file)
+        own = _order(net, file) + _connections(net, file) + _lanes(net, file)
+        own += _merging_point(ramp) + _lane_end(net, file)
+        own += [] if file.described else _of_encounters(net, file, ramp)
+    own += [] if file.described else _lengths(net, file)
+    own += _extensions(file) + _mapping(net, file)
     return [f"{folder / FILE_NAME}: {problem}" for problem in own] + _sources(folder, file)
+
+
+def _of_encounters(net: sumolib.net.Net, file: RampFile, ramp: Ramp) -> list[str]:
+    """What hinders encounters; of a net that somebody has for living traffic it is only good to know."""
+    return _speeds(net, file) + _reach(ramp) + _lights(net, file)
 
 
 def notes(folder: Path) -> list[str]:
@@ -61,11 +68,17 @@ def notes(folder: Path) -> list[str]:
         ramp = Ramp.from_file(folder, file)
     except UserError:
         return []
-    found = []
+    found = _of_encounters(net, file, ramp) if file.described else []
     if net._location.get("projParameter", "!") == "!":
         found.append(f"{file.net}: no georeference: no map can be put behind it (<location> in the .nod.xml gives one)")
-    if not list(folder.glob("*.netccfg")):
+    if not file.described and not list(folder.glob("*.netccfg")):
         found.append("no *.netccfg: the ramp can be used, but neither edited nor rebuilt")
+    gore = net.getEdge(file.gore).getFromNode()
+    if not ramp.changes_lane and gore.getType() == "unregulated":
+        found.append(
+            f"gore: at node '{gore.getID()}' of type 'unregulated' SUMO's own drivers do not see each other; "
+            "that is no matter to encounters, but others collide: make its type 'zipper' in the .nod.xml"
+        )
     left = ramp.auxiliary_end - ramp.merging_point
     needed = ramp.speed_limit**2 / (2.0 * COMFORTABLE_BRAKING)
     if ramp.speed_limit**2 / (2.0 * HARD_BRAKING) <= left < needed:
@@ -158,7 +171,7 @@ def _lanes(net: sumolib.net.Net, file: RampFile) -> list[str]:
 
 
 def _reach(ramp: Ramp) -> list[str]:
-    """Paths that are too short for a run, and a merging point off the acceleration lane or too near its end."""
+    """Paths that are too short for a run."""
     problems = []
     if ramp.upstream < MIN_UPSTREAM:
         problems.append(
@@ -170,6 +183,12 @@ def _reach(ramp: Ramp) -> list[str]:
         problems.append(
             f"main: {beyond:.0f} m after the merging point, less than {MIN_DOWNSTREAM:.0f} m; make the last edge longer"
         )
+    return problems
+
+
+def _merging_point(ramp: Ramp) -> list[str]:
+    """A merging point off the acceleration lane or too near its end."""
+    problems = []
     left = ramp.auxiliary_end - ramp.merging_point
     needed = ramp.speed_limit**2 / (2.0 * HARD_BRAKING)
     if left < 0.0:
@@ -264,7 +283,7 @@ def _mapping(net: sumolib.net.Net, file: RampFile) -> list[str]:
 
 def _sources(folder: Path, file: RampFile) -> list[str]:
     """A net that is not what its plain XML builds."""
-    if not list(folder.glob("*.netccfg")):
+    if file.described or not list(folder.glob("*.netccfg")):
         return []
     try:
         fresh = built(config(folder))

@@ -52,6 +52,7 @@ class RampFile(_Table):
     Attributes:
         title: One line for lists and reports.
         net: File name of the built net, beside this file.
+        described: The net is somebody's own, which this file describes and nobody here builds (`ramp describe`).
         main: Edges of the main road, in driving order.
         host_lane: SUMO lane index of the host on each edge of `main`.
         ramp: Edges of the merging car, in driving order; where there is an auxiliary lane, the last ones are edges of
@@ -68,6 +69,7 @@ class RampFile(_Table):
 
     title: str
     net: str
+    described: bool = False
     main: list[str] = Field(min_length=2)
     host_lane: list[int]
     ramp: list[str] = Field(min_length=1)

@@ -11,8 +11,9 @@ import sumolib
 from merge_cosim.errors import UserError
 from merge_cosim.ramps.build import netconvert
 from merge_cosim.ramps.folder import require_new
-from merge_cosim.ramps.from_net import Origin, ramp_from_net, root_element
+from merge_cosim.ramps.from_net import ramp_from_net
 from merge_cosim.ramps.new import RampNumbers
+from merge_cosim.ramps.onramp import Origin, root_element
 
 KEPT = ("highway.motorway", "highway.motorway_link", "highway.trunk", "highway.trunk_link")
 """Kinds of roads that are read from the extract."""

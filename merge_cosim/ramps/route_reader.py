@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 from lxml import etree
 
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
-from merge_cosim.ramps.definition import FILE_NAME
+from merge_cosim.ramps.configuration import Configuration, parse
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.routes import MERGE_POSITION, ROLE
 
@@ -32,68 +31,12 @@ class _Car:
     merge_position: float | None
 
 
-@dataclass(frozen=True)
-class Configuration:
-    """A `.sumocfg`, as far as we need to know it.
-
-    Attributes:
-        file: The file.
-        net: Its net, beside which lies a `ramp.toml`.
-        routes: Its route files.
-        additional: Its additional files.
-        end: Its end [s]; inf if it does not say.
-    """
-
-    file: Path
-    net: Path
-    routes: tuple[Path, ...]
-    additional: tuple[Path, ...]
-    end: float
-
-    @classmethod
-    def read(cls, file: Path) -> Configuration:
-        """Read it.
-
-        Raises:
-            UserError: A file is missing or no XML, or the net is not that of a ramp.
-        """
-        root = _parse(file)
-        net = file.parent / (_option(root, "net-file") or _missing(file, "net-file"))
-        if not (net.parent / FILE_NAME).is_file():
-            raise UserError(
-                f"{file}: no {FILE_NAME} beside its net {net}; make a ramp with: "
-                f"merge-cosim ramp new NAME --from-net {net.name}"
-            )
-        routes, additional = (
-            tuple(file.parent / name.strip() for name in _option(root, option).split(",") if name.strip())
-            for option in ("route-files", "additional-files")
-        )
-        if not routes:
-            _missing(file, "route-files")
-        return cls(file, net, routes, additional, float(_option(root, "end") or math.inf))
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All of them."""
-        return (self.file, self.net, *self.routes, *self.additional)
-
-    def vehicles(self) -> Iterator[etree._Element]:
-        """Everything in the route files that puts a vehicle or a person in."""
-        for file in self.routes:
-            yield from _parse(file).iter("vehicle", "trip", "flow", "person", "personFlow")
-
-    def names_role(self, role: str) -> bool:
-        """Whether any vehicle or type has the role."""
-        parameters = (one for file in (*self.routes, *self.additional) for one in _parse(file).iter("param"))
-        return any(one.get("key") == ROLE and one.get("value") == role for one in parameters)
-
-
 def only_pairs(configuration: Configuration) -> bool:
     """Whether there is nothing but as many hosts as merging cars, starting from numbers: encounters, and no traffic."""
-    entries = [entry for file in configuration.routes for entry in _entries(_parse(file)) if entry.has_start]
+    entries = [entry for file in configuration.routes for entry in _entries(parse(file)) if entry.has_start]
     roles = [entry.role for entry in entries]
     everything = len(list(configuration.vehicles()))
-    return everything == len(entries) and roles.count("host") == roles.count("merging")
+    return 0 < everything == len(entries) and roles.count("host") == roles.count("merging")
 
 
 def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
@@ -178,7 +121,7 @@ def _entries(root: etree._Element) -> Iterator[_Entry]:
 
 
 def _cars(file: Path) -> Iterator[tuple[str, _Car]]:
-    root = _parse(file)
+    root = parse(file)
     routes = {route.get("id"): route.get("edges", "") for route in root.iter("route")}
     for entry in _entries(root):
         vehicle, kind, role, parameters = entry.vehicle, entry.kind, entry.role, entry.parameters
@@ -214,21 +157,3 @@ def _is_number(text: str | None) -> bool:
         return math.isfinite(float(text or ""))
     except ValueError:
         return False
-
-
-def _option(root: etree._Element, name: str) -> str:
-    """Value of an option, under its long name."""
-    return next((str(element.get("value", "")) for element in root.iter(name)), "")
-
-
-def _missing(file: Path, name: str) -> NoReturn:
-    raise UserError(f"{file}: no <{name} value=.../>")
-
-
-def _parse(file: Path) -> etree._Element:
-    try:
-        return etree.parse(str(file)).getroot()
-    except OSError:
-        raise UserError(f"{file}: no such file") from None
-    except etree.XMLSyntaxError as error:
-        raise UserError(f"{file}: not XML: {error}") from None

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from merge_cosim.errors import UserError
-from merge_cosim.ramps.definition import RampFile, read_ramp_file
+from merge_cosim.ramps.definition import read_ramp_file
 from merge_cosim.ramps.from_net import ramp_from_net
 from merge_cosim.ramps.from_osm import ramp_from_osm
 from merge_cosim.ramps.new import RampNumbers, new_ramp
@@ -42,10 +42,12 @@ def start_ramp(
         ramp_from_net(folder, net, link, **numbers)
     elif extract is not None:
         ramp_from_osm(folder, extract, link, **numbers)
-    return folder, _found(read_ramp_file(folder))
+    return folder, found(folder)
 
 
-def _found(file: RampFile) -> list[str]:
+def found(folder: Path) -> list[str]:
+    """What a ramp's `ramp.toml` names, and where it comes from, a line each."""
+    file = read_ramp_file(folder)
     return [
         f"main road: {' '.join(file.main)}, host's lanes {' '.join(map(str, file.host_lane))}",
         f"on-ramp: {' '.join(file.ramp)}, merging lanes {' '.join(map(str, file.merging_lane))}",

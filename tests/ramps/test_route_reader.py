@@ -1,10 +1,14 @@
 """Encounters from route files: what was written comes back, a user's own file runs, mistakes are named."""
 
+import gzip
+import math
+
 import numpy as np
 import pytest
 
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
+from merge_cosim.ramps.configuration import Configuration
 from merge_cosim.ramps.new import RampNumbers, new_ramp
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.route_reader import read_sumocfg
@@ -74,11 +78,68 @@ def test_mistakes_in_routes_are_named(tmp_path, old, new, expected):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("my.rou.xml", "other.rou.xml", r"other\.rou\.xml: no such file"),
-        ("net-file", "net-fil", r"my\.sumocfg: no <net-file"),
-        ("mine/", "", r"no ramp\.toml beside its net"),
+        ("my.rou.xml", "other.rou.xml", r"my\.sumocfg: .*other\.rou\.xml: no such file"),
+        ("net-file", "net-fil", r"my\.sumocfg: SUMO cannot read it: No option with the name 'net-fil' exists"),
+        ('<net-file value="mine/designed.net.xml"/>', "", r"my\.sumocfg: no <net-file"),
+        ("</configuration>", "", r"my\.sumocfg: SUMO cannot read it: .*ended"),
+        ("</input>", '<mesosim value="true"/></input>', r"mesosim"),
+        ("</input>", '<end value="soon"/></input>', r"my\.sumocfg: 'soon' is no time"),
     ],
 )
 def test_mistakes_in_the_configuration_are_named(tmp_path, old, new, expected):
+    assert old in CONFIG
     with pytest.raises(UserError, match=expected):
         read_sumocfg(write(tmp_path, config=CONFIG.replace(old, new)))
+
+
+def test_a_net_without_a_ramp_says_how_to_get_one(tmp_path):
+    file = write(tmp_path)
+    (tmp_path / "mine" / "ramp.toml").unlink()
+    with pytest.raises(UserError, match=r"no ramp\.toml .*merge-cosim ramp describe .*mine/mine\.net\.xml"):
+        Configuration.read(file)
+
+
+def test_a_ramp_file_of_another_net_is_refused(tmp_path):
+    file = write(tmp_path)
+    net = tmp_path / "mine" / "mine.net.xml"
+    (tmp_path / "mine" / "other.net.xml").write_bytes(net.read_bytes())
+    file.write_text(file.read_text().replace("mine.net.xml", "other.net.xml"))
+    with pytest.raises(UserError, match=r"is that of mine\.net\.xml, not of the net other\.net\.xml"):
+        Configuration.read(file)
+
+
+def test_options_by_any_of_sumos_names(tmp_path, monkeypatch):
+    """Short names, times of day, spaces, variables of the environment, compressed files, files that include others."""
+    write(tmp_path)
+    monkeypatch.setenv("WHERE", "demand")
+    demand = tmp_path / "demand"
+    demand.mkdir()
+    (demand / "one.rou.xml.gz").write_bytes(gzip.compress(b'<routes><include href="two.rou.xml"/></routes>'))
+    (demand / "two.rou.xml").write_text('<routes><flow id="f" type="t" end="1"/></routes>')
+    (demand / "types.add.xml").write_text(
+        '<add><vType id="t"/><vTypeDistribution id="d" vTypes="t u"/><vType id="u"/></add>'
+    )
+    file = tmp_path / "short.sumocfg"
+    file.write_text(
+        f'<sumoConfiguration><n value="{tmp_path}/mine/mine.net.xml"/><b value="7:00:00"/>'
+        '<time><e value="1:7:0:0"/></time>'
+        '<routes value="my.rou.xml , ${WHERE}/one.rou.xml.gz"/><additional value="demand/types.add.xml"/>'
+        "</sumoConfiguration>"
+    )
+    found = Configuration.read(file)
+    assert found.net == tmp_path / "mine" / "mine.net.xml"
+    assert found.routes == (tmp_path / "my.rou.xml", demand / "one.rou.xml.gz")
+    assert (found.begin, found.end) == (7 * 3600.0, 31 * 3600.0)
+    assert [one.get("id") for one in found.vehicles()] == ["h0", "m0", "bystander", "f"]
+    assert found.names_role("host")
+    for known in ("f", "f.7", "t", "bystander", "DEFAULT_VEHTYPE"):
+        found.require(known)
+    with pytest.raises(UserError, match=r"host = 'd': it stands for several types; choose one: t, u"):
+        found.require("d")
+    with pytest.raises(UserError, match=r"no vehicle, flow or type of its files has this id.*choose from: .*f, human"):
+        found.require("nobody")
+
+
+def test_times_that_a_configuration_leaves_open(tmp_path):
+    found = Configuration.read(write(tmp_path))
+    assert (found.begin, found.end) == (0.0, math.inf)

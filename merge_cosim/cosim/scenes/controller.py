@@ -60,7 +60,7 @@ class HostController:
             attention: Which merging cars a host attends to.
             horizon: A meeting lasts until both cars have been past the place of the lane change for this long [s].
             seed: Seed of the methods' random streams.
-            host: A vehicle or type that is a host without saying so.
+            host: A vehicle, flow or type that is a host without saying so.
         """
         self._api, self._ramp, self._driver, self._setting = api, ramp, driver, setting
         self._attention, self._seed = attention, seed
@@ -72,6 +72,7 @@ class HostController:
         self._open: dict[Meeting, Bank] = {}
         self._met: dict[str, set[str]] = {}
         self._cycle = 0
+        self._teleports = self._teleported()
         self.finished: list[Meeting] = []
         self.notes = Notes()
 
@@ -81,7 +82,7 @@ class HostController:
         self._note_events()
         self._end_meetings()
         self._begin_meetings()
-        hosts = list(self._roster.hosts.values())
+        hosts = [host for host in self._roster.hosts.values() if host.driven]
         wanted, ahead, behind = self._by_leader(hosts)
         contact = set(self._api.simulation.getCollidingVehiclesIDList()) if self._open else set()
         for bank in self._banks:
@@ -100,13 +101,22 @@ class HostController:
         return self._roster.host_count
 
     def close(self) -> None:
-        """End the meetings that are still open, and note the hosts that never came in."""
+        """End the meetings that are still open, and note the hosts that never came in, or that there were none."""
         for meeting in list(self._open):
             self._end(meeting, Ending.CENSORED if meeting.merged_at >= 0 else Ending.NOT_NEXT)
         for name in self._api.simulation.getPendingVehicles():
             if self._roster.role(name) == "host":
                 line = f"host {name} never departed: no room where it was to enter"
                 self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
+        # With time-to-teleport.remove SUMO takes cars out without saying which.
+        for number in range(self._teleported() - self._teleports - self.notes.counts()[Event.TELEPORT]):
+            self.notes.add(Event.TELEPORT, f"removed {number}", "SUMO took out a vehicle that had waited too long")
+        if not self.host_count:
+            self.notes.add(Event.NO_HOST, "", "no host came in that drives along the main road past the gore")
+
+    def _teleported(self) -> int:
+        """Teleports so far, as SUMO counts them."""
+        return int(self._api.simulation.getParameter("", "stats.teleports.total"))
 
     def _by_leader(
         self, hosts: list[Actor]
@@ -135,7 +145,7 @@ class HostController:
         present = self._roster
         for meeting in list(self._open):
             host, merging = meeting.host, meeting.merging
-            here = host.name in present.hosts and merging.name in present.merging and host.is_on(Part.HOST)
+            here = host.name in present.hosts and merging.name in present.merging and host.driven
             if meeting.merged_at < 0:
                 self._await_lane_change(meeting, here)
             elif not here or not merging.is_on(Part.HOST):
@@ -146,7 +156,7 @@ class HostController:
                 self._end(meeting, Ending.SCORED)
         open_now = {meeting.merging.name for meeting in self._open}
         for name, merging in list(present.merging.items()):
-            if not merging.is_on(Part.MERGING) and name not in open_now:
+            if merging.has_come and not merging.is_on(Part.MERGING) and name not in open_now:
                 present.forget(name)
 
     def _await_lane_change(self, meeting: Meeting, here: bool) -> None:
@@ -190,12 +200,12 @@ class HostController:
         first, last = ramp.merging_point - attention.upstream, ramp.ramp[-1].end
         waiting = [car for car in self._roster.merging.values() if car.is_on(Part.MERGING) and car.x >= first]
         for host in self._roster.hosts.values():
-            if not host.is_on(Part.HOST):
-                if host.is_on(Part.BESIDE):
-                    line = f"host {host.name} drives beside the host lane, where it meets nobody"
-                    self.notes.add(Event.HOST_OFF_LANE, host.name, line)
+            if host.lane is None or not first <= host.x <= last + attention.apart:
                 continue
-            if first <= host.x <= last + attention.apart:
+            if host.is_on(Part.BESIDE):
+                line = f"host {host.name} drives beside the host lane, where it meets nobody"
+                self.notes.add(Event.HOST_OFF_LANE, host.name, line)
+            if host.driven:
                 for merging in waiting:
                     if merging.copy == host.copy and abs(host.x - merging.x) <= attention.apart:
                         yield host, merging

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from enum import Enum
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 from merge_cosim.ramps.ramp import Ramp
@@ -35,6 +36,13 @@ class RampLane(NamedTuple):
     part: Part
 
 
+class _Joint(NamedTuple):
+    """The last edge before the gore and the first one after it, on both paths."""
+
+    by_main: tuple[str, str]
+    by_ramp: tuple[str, str]
+
+
 class RampLanes:
     """Finds the meaning of a SUMO lane by its id; None for one off the ramp's two paths."""
 
@@ -48,8 +56,22 @@ class RampLanes:
         return self._known[lane]
 
     def comes_by_ramp(self, route: tuple[str, ...]) -> bool:
-        """Whether a route leads over the on-ramp."""
-        return any(self._plain(edge)[1] in self._own_edges for edge in route)
+        """Whether a route leads over the on-ramp to the main road."""
+        return self._joint.by_ramp in self._pairs(route)
+
+    def comes_by_main(self, route: tuple[str, ...]) -> bool:
+        """Whether a route leads along the main road past the gore."""
+        return self._joint.by_main in self._pairs(route)
+
+    def _pairs(self, route: tuple[str, ...]) -> set[tuple[str, str]]:
+        """Every two edges that follow one another, by their own ids."""
+        return set(pairwise(self._plain(edge)[1] for edge in route))
+
+    @cached_property
+    def _joint(self) -> _Joint:
+        gore = next(section.edge for section in self._ramp.main if section.start >= 0.0)
+        before, link = ([one.edge for one in path if one.end <= 0.0][-1] for path in (self._ramp.main, self._ramp.ramp))
+        return _Joint((before, gore), (link, gore))
 
     @cached_property
     def _own_edges(self) -> frozenset[str]:

@@ -9,6 +9,7 @@ from enum import StrEnum
 class Event(StrEnum):
     """What is noted."""
 
+    NO_HOST = "without_host"
     HOST_NOT_DEPARTED = "hosts_not_departed"
     HOST_OFF_LANE = "hosts_off_lane"
     TWO_HOSTS = "two_hosts"

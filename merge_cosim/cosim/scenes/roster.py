@@ -6,7 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from merge_cosim.cosim.scenes.lanes import Part, RampLane, RampLanes
-from merge_cosim.cosim.session import LANE_CHANGE_MODE_NONE, SPEED_MODE_UNCHECKED
+from merge_cosim.cosim.session import (
+    LANE_CHANGE_MODE_NONE,
+    LANE_CHANGE_MODE_SUMO,
+    SPEED_MODE_SUMO,
+    SPEED_MODE_UNCHECKED,
+)
 from merge_cosim.cosim.tracks import DECIMALS
 from merge_cosim.ramps.routes import ROLE
 
@@ -22,6 +27,10 @@ class Actor:
         lane: Where it drives, None off the ramp.
         x: Its front bumper [m past the gore].
         speed: Its speed [m/s].
+        sumo_lane: SUMO's id of the lane.
+        has_come: It has been on the ramp's paths.
+        goes_on: The lane leads to the next edge of its route, or its route ends there.
+        driven: It is a host that the method drives.
     """
 
     name: str
@@ -30,6 +39,10 @@ class Actor:
     lane: RampLane | None = None
     x: float = 0.0
     speed: float = 0.0
+    sumo_lane: str = ""
+    has_come: bool = False
+    goes_on: bool = True
+    driven: bool = False
 
     @property
     def copy(self) -> str:
@@ -44,8 +57,11 @@ class Actor:
 class Roster:
     """Keeps the hosts and the merging cars of a running SUMO.
 
-    A host's type, or the host itself, carries the parameter `merge-cosim.role` = `host`, or is named as `host`. Merging
-    cars carry `merging`; where no type does, they are all cars whose route leads over the on-ramp.
+    A host's type, or the host itself, carries the parameter `merge-cosim.role` = `host`. Or it is named as `host`: by
+    itself, or by its flow or type if its route leads along the main road past the gore. Merging cars carry `merging`;
+    where no type does, they are all cars whose route leads over the on-ramp to the main road.
+
+    The method drives a host on the host lane, up to the edge on which its route leaves that lane. Elsewhere SUMO does.
 
     Attributes:
         hosts, merging: Those in the net, by SUMO's id; a merging car is forgotten once `forget` says so.
@@ -75,10 +91,18 @@ class Roster:
         vehicle, lanes = self._api.vehicle, self._lanes
         for actors in (self.hosts, self.merging):
             for actor in actors.values():
-                actor.lane = lane = lanes[vehicle.getLaneID(actor.name)]
+                sumo_lane = vehicle.getLaneID(actor.name)
+                if sumo_lane != actor.sumo_lane:
+                    actor.sumo_lane, actor.lane = sumo_lane, lanes[sumo_lane]
+                    actor.goes_on = actor.name not in self.hosts or self._goes_on(actor)
+                lane = actor.lane
                 actor.speed = round(vehicle.getSpeed(actor.name), DECIMALS)
                 if lane is not None:
+                    actor.has_come = True
                     actor.x = round(lane.start + vehicle.getLanePosition(actor.name), DECIMALS)
+        for host in self.hosts.values():
+            if host.driven != (host.is_on(Part.HOST) and host.goes_on):
+                self._drive(host, not host.driven)
 
     def forget(self, merging: str) -> None:
         """Watch a merging car no longer."""
@@ -87,8 +111,12 @@ class Roster:
     def role(self, name: str) -> str:
         """`host`, `merging` or nothing."""
         kind = self._api.vehicle.getTypeID(name)
-        if self._host and self._host in (name, kind):
-            return "host"
+        if self._host:
+            if name == self._host:
+                return "host"
+            route = self._api.vehicle.getRoute(name)
+            if self._host in (kind, name.rpartition(".")[0]) and self._lanes.comes_by_main(route):
+                return "host"
         own = self._api.vehicle.getParameter(name, ROLE) or self._type_role(kind)
         if own or self._roles_merging:
             return str(own)
@@ -104,8 +132,21 @@ class Roster:
             return
         self.hosts[name] = actor
         self.host_count += 1
-        vehicle.setSpeedMode(name, SPEED_MODE_UNCHECKED)
-        vehicle.setLaneChangeMode(name, LANE_CHANGE_MODE_NONE)
+
+    def _goes_on(self, host: Actor) -> bool:
+        vehicle = self._api.vehicle
+        onward = vehicle.getRoute(host.name)[vehicle.getRouteIndex(host.name) + 1 :]
+        if not onward or not host.sumo_lane:
+            return True
+        return any(link[0].rpartition("_")[0] == onward[0] for link in self._api.lane.getLinks(host.sumo_lane))
+
+    def _drive(self, host: Actor, method: bool) -> None:
+        """Give the wheel to the method, or back to SUMO."""
+        vehicle, host.driven = self._api.vehicle, method
+        vehicle.setSpeedMode(host.name, SPEED_MODE_UNCHECKED if method else SPEED_MODE_SUMO)
+        vehicle.setLaneChangeMode(host.name, LANE_CHANGE_MODE_NONE if method else LANE_CHANGE_MODE_SUMO)
+        if not method:
+            vehicle.setSpeed(host.name, -1.0)
 
     def _type_role(self, kind: str) -> str:
         if kind not in self._role_of_type:

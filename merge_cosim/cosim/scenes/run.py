@@ -44,7 +44,7 @@ class Scene:
         seed: SUMO's seed.
         end: Its end [s]; inf for when the last car has left.
         warm_up: The throughput is counted from here on [s].
-        host: A vehicle or type that is a host without saying so.
+        host: A vehicle, flow or type that is a host without saying so.
         attention: Which merging cars a host attends to.
     """
 
@@ -67,12 +67,14 @@ class SceneRun:
         facts: Counts and means of its traffic.
         notes: What its user should know, a line for each event.
         effort: What it cost.
+        begin: Time at which it began [s].
     """
 
     meetings: list[Meeting]
     facts: dict[str, float]
     notes: list[tuple[Event, str]]
     effort: Effort
+    begin: float
 
 
 def run_scene(
@@ -99,7 +101,7 @@ def run_scene(
         UserError: SUMO refuses the configuration, at its start or on the way; or see `attached_to`.
     """
     with _running_sumo(scene, gui_delay, extra, attach) as api:
-        begin = perf_counter()
+        started = perf_counter()
         controller = HostController(
             api,
             scene.ramp,
@@ -111,7 +113,8 @@ def run_scene(
             scene.host,
         )
         effort = Effort()
-        simulation, count, arrived, time = api.simulation, api.vehicle.getIDCount, 0, 0.0
+        simulation, count, arrived = api.simulation, api.vehicle.getIDCount, 0
+        time = begin = simulation.getTime()
         while time < scene.end and simulation.getMinExpectedNumber() > 0:
             before = perf_counter()
             api.simulationStep()
@@ -122,10 +125,10 @@ def run_scene(
             if time > scene.warm_up:
                 arrived += simulation.getArrivedNumber()
         controller.close()
-        effort.wall_s, effort.scene_s = perf_counter() - begin, time
+        effort.wall_s, effort.scene_s = perf_counter() - started, time - begin
         facts: dict[str, float] = {
-            "simulated_s": time,
-            "throughput_veh_h": round(HOUR * arrived / max(time - scene.warm_up, setting.dt), 1),
+            "simulated_s": round(time - begin, 3),
+            "throughput_veh_h": round(HOUR * arrived / max(time - max(scene.warm_up, begin), setting.dt), 1),
             **{name: float(simulation.getParameter("", key)) for name, key in _STATISTICS.items()},
             "hosts": controller.host_count,
             "meetings": len(controller.finished),
@@ -133,7 +136,7 @@ def run_scene(
             "merging_stopped": sum(meeting.stopped for meeting in controller.finished),
             **controller.notes.counts(),
         }
-        return SceneRun(controller.finished, facts, controller.notes.lines, effort)
+        return SceneRun(controller.finished, facts, controller.notes.lines, effort, begin)
 
 
 @contextmanager
@@ -149,7 +152,9 @@ def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], a
         "device.tripinfo.probability": 1,
         "no-step-log": "true",
         "no-warnings": "true",
+        "verbose": "false",
         "duration-log.disable": "true",
+        "duration-log.statistics": "false",
         "xml-validation": "never",
     }
     words = [str(word) for name, value in options.items() for word in (f"--{name}", value)] + list(extra)
@@ -157,6 +162,7 @@ def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], a
         api, errors = attached_to(attach, conditions)
         refuse_other_net(api, scene.ramp.net, {*scene.ramp.main_route, *scene.ramp.ramp_route}, attach)
     elif gui_delay is None:
+        words += ["--remote-port", "0"]  # SUMO would wait there for somebody
         api, errors = libsumo_started(words, scene.file)
     else:
         words += ["--delay", str(gui_delay)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from living import OTHERS, drive, us101, vehicle
+from living import OTHERS, TYPES, drive, us101, vehicle
 
 from merge_cosim.control.acc import Acc
 from merge_cosim.cosim.scenes.meetings import RECORDED, Ending
@@ -168,6 +168,39 @@ def test_a_host_beside_its_lane_is_noted_and_meets_nobody(tmp_path):
         controller.close()
     assert len(noted(controller, Event.HOST_OFF_LANE)) == 1
     assert controller.finished == []
+
+
+def test_sumo_drives_a_host_where_the_method_does_not(tmp_path):
+    """In the host lane the method drives, up to the edge on which the route leaves it; elsewhere SUMO does."""
+    leaving = '<route id="leaving" edges="main_in weave exit"/>'
+    cars = (
+        vehicle("h", "host", 300, 20, route="leaving"),
+        vehicle("b", "host", 300, 20, lane=3),
+    )
+    driven, speeds, lanes = {"h": [], "b": []}, [], []
+    with us101(tmp_path, *cars, types=TYPES + leaving) as (api, controller):
+
+        def each(_):
+            for name, found in driven.items():
+                if name in api.vehicle.getIDList():
+                    found.append((api.vehicle.getLaneID(name), api.vehicle.getSpeedMode(name) == 32))
+            lanes.append(api.vehicle.getLaneID("h") if "h" in api.vehicle.getIDList() else "")
+            speeds.append(api.vehicle.getSpeed("b"))
+
+        drive(api, controller, 250, each)
+    assert dict(driven["h"][2:110])["main_in_0"]
+    assert "exit_0" in lanes  # SUMO brought it there: the host lane does not lead to the exit
+    assert not dict(driven["h"])["exit_0"]
+    assert not any(by_method for lane, by_method in driven["b"] if lane == "main_in_3")
+    assert speeds[50] > 20.0
+
+
+def test_no_host_at_all_is_noted(tmp_path):
+    with us101(tmp_path, vehicle("m", "merging", 400, 20, route="ramp"), host="merging") as (api, controller):
+        drive(api, controller, 3)
+        controller.close()
+    assert len(noted(controller, Event.NO_HOST)) == 1
+    assert controller.notes.counts()["without_host"] == 1
 
 
 def test_a_host_that_never_departs_is_noted(tmp_path):
