@@ -59,11 +59,13 @@ def export_scene(batch: SceneBatch, out: Path) -> Path:
     """Write the files of the scenario's scenes into a folder; returns the `.sumocfg`. They differ by SUMO's seed alone.
 
     Raises:
-        UserError: The scenario is a configuration already.
+        UserError: The scenario is a configuration already, or its traffic drives on several copies of the ramp.
     """
     traffic = batch.scenario.encounters
     if not isinstance(traffic, Traffic):
         raise UserError(f"{batch.file}: this is a SUMO configuration already")
+    if traffic.demand.copies > 1:
+        raise UserError("export: the files of one ramp are written; leave out encounters.demand.copies")
     return write_traffic(out, traffic.demand, Ramp.load(batch.scenario.ramp))
 
 
