@@ -28,7 +28,7 @@ from merge_cosim.registry import load_plugin
 
 LOCAL = "local"
 """Address that stands for a cluster of this machine's processes, made for the sweep."""
-CONNECT_S = 10.0
+CONNECT_S = 5.0
 """Time [s] in which a scheduler must answer."""
 WORKERS_S = 60.0
 """Time [s] in which its first worker must be there."""

@@ -151,6 +151,18 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent):
     assert "Traceback" not in error
     kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")}
     assert 0 < len(kept) < 6
+    if sent == signal.SIGKILL:
+        refused_without_leave(tmp_path, arguments)
+    assert {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")} == kept
+    resumed = merge_cosim("sweep", *arguments, "--out", "out", "--resume", cwd=tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    unbroken = merge_cosim("sweep", *arguments, "--out", "whole", cwd=tmp_path)
+    assert unbroken.returncode == 0
+    assert (tmp_path / "out/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
+
+
+def refused_without_leave(tmp_path, arguments):
+    """An interrupted sweep is neither overwritten nor mixed with another."""
     again = merge_cosim("sweep", *arguments, "--out", "out", cwd=tmp_path)
     assert again.returncode == 2
     assert "--resume" in again.stderr
@@ -164,12 +176,6 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent):
     assert other.returncode == 2
     assert "versions changed" in other.stderr
     plan.write_text(json.dumps(held))
-    assert {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")} == kept
-    resumed = merge_cosim("sweep", *arguments, "--out", "out", "--resume", cwd=tmp_path)
-    assert resumed.returncode == 0, resumed.stderr
-    unbroken = merge_cosim("sweep", *arguments, "--out", "whole", cwd=tmp_path)
-    assert unbroken.returncode == 0
-    assert (tmp_path / "out/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
 
 
 SLIPS = (

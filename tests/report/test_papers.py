@@ -25,10 +25,10 @@ COARSE = {f"encounters.{name}.step": 12 for name in ("host_speed", "merging_spee
 
 @pytest.fixture(scope="module")
 def small() -> list[Study]:
-    """A grid of few speeds, and one in ten of the surrogate's pairs (the model's training cars are not among them)."""
+    """A grid of few speeds, and one in twenty of the surrogate's pairs, none of the training cars among them."""
     designed = SweepRequest(("designed-2",), METHODS, settings=COARSE)
     pairs = SweepRequest(
-        ("us101-replay",), METHODS, "us101-surrogate", {"encounters.fraction": 0.9}, source="surrogate"
+        ("us101-replay",), METHODS, "us101-surrogate", {"encounters.fraction": 0.95}, source="surrogate"
     )
     nodes = replace(pairs, methods=("pgm",), variations=[("pgm.nodes", (1, 52, 80))])
     return [
