@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from filelock import FileLock
 
 from merge_cosim.errors import UserError
 from merge_cosim.files import cache_folder
@@ -39,16 +40,15 @@ def cached_surrogate(recipe: Recipe) -> Path:
     """Return the folder that holds what `generate` makes of a recipe, from the cache if it was made before."""
     ramp = Ramp.load(recipe.site)
     folder = cache_folder("surrogate") / f"{recipe.site}-{_key(recipe, ramp)}"
-    if not folder.is_dir():
-        made = Path(tempfile.mkdtemp(dir=folder.parent))
-        try:
-            generate(recipe, ramp, made / f"{recipe.site}-surrogate.parquet")
-            made.rename(folder)
-        except OSError:
-            if not folder.is_dir():  # else another process was faster
-                raise
-        finally:
-            shutil.rmtree(made, ignore_errors=True)
+    if folder.is_dir():
+        return folder
+    with FileLock(folder.with_suffix(".lock")):  # another process may be at it already
+        if not folder.is_dir():
+            with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
+                made = Path(scratch) / "made"
+                made.mkdir()
+                generate(recipe, ramp, made / f"{recipe.site}-surrogate.parquet")
+                made.rename(folder)
     return folder
 
 
