@@ -18,7 +18,7 @@ import numpy as np
 
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import Pairs
+from merge_cosim.experiments.encounter_sources import Pairs
 from merge_cosim.experiments.sources import SourceChoice, pairs_of_site
 from merge_cosim.experiments.training import train
 from merge_cosim.intention.model import MODELS, IntentionModel

@@ -6,7 +6,7 @@ import numpy as np
 
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import Drawn
+from merge_cosim.experiments.encounter_sources import Drawn
 from merge_cosim.streams import stream_keys, uniform
 
 ATTEMPTS = 200

@@ -15,7 +15,8 @@ from merge_cosim.cosim.plant import Plant
 from merge_cosim.cosim.scenes.scene_plant import Place, ScenePlant
 from merge_cosim.cosim.scoring import HOST_INTO_LEADER
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import Pairs, Scenario
+from merge_cosim.experiments.encounter_sources import Pairs
+from merge_cosim.experiments.scenario import Scenario
 from merge_cosim.experiments.store import with_scene_facts
 from merge_cosim.experiments.work import Batch, Workplace
 from merge_cosim.ngsim.scenes import LoggedScene, episode_scenes, pair_in_scene, site_scenes

@@ -11,7 +11,8 @@ from merge_cosim.control.base import controllers
 from merge_cosim.cosim.loop import Driver
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import SECTIONS, steps_between
+from merge_cosim.experiments.encounter_sources import steps_between
+from merge_cosim.experiments.scenario import SECTIONS
 from merge_cosim.intention.base import estimators
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.registry import did_you_mean, parameters

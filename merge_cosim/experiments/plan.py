@@ -15,6 +15,7 @@ import numpy as np
 import merge_cosim
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
+from merge_cosim.experiments.encounter_sources import Routes, Traffic
 from merge_cosim.experiments.full_scenes import SceneReplay, load_scenes
 from merge_cosim.experiments.methods import (
     CONSTANT,
@@ -24,7 +25,7 @@ from merge_cosim.experiments.methods import (
     methods_for,
     split_settings,
 )
-from merge_cosim.experiments.scenario import Routes, Scenario, Traffic, load_scenario
+from merge_cosim.experiments.scenario import Scenario, load_scenario
 from merge_cosim.experiments.scenes import SceneBatch
 from merge_cosim.experiments.sources import SourceChoice, load_encounters
 from merge_cosim.experiments.statistics.comparison import reference_of

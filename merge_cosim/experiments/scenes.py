@@ -19,8 +19,8 @@ from merge_cosim.cosim.scenes.meetings import Ending, Meeting
 from merge_cosim.cosim.scenes.run import Scene, SceneRun, run_scene
 from merge_cosim.cosim.scenes.scoring import encounters_of, score, to_be_scored
 from merge_cosim.cosim.scoring import Rules
+from merge_cosim.experiments.encounter_sources import Routes, Traffic
 from merge_cosim.experiments.outcome import result_rows
-from merge_cosim.experiments.scenario import Routes, Traffic
 from merge_cosim.experiments.statistics.summary import TRAFFIC
 from merge_cosim.experiments.store import with_scene_facts
 from merge_cosim.experiments.work import Task, Workplace, free_law

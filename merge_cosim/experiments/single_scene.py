@@ -13,7 +13,7 @@ from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.scenes.meetings import RECORDED
 from merge_cosim.cosim.scenes.run import SceneRun
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.scenario import Traffic
+from merge_cosim.experiments.encounter_sources import Traffic
 from merge_cosim.experiments.scenes import SceneBatch
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.registry import did_you_mean

@@ -12,7 +12,8 @@ import numpy as np
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.drawn import drawn_encounters
-from merge_cosim.experiments.scenario import Drawn, Grid, Pairs, Random, Routes, Scenario, Traffic
+from merge_cosim.experiments.encounter_sources import Drawn, Grid, Pairs, Random, Routes, Traffic
+from merge_cosim.experiments.scenario import Scenario
 from merge_cosim.ngsim.data import data_files, episode_files, load_trajectories
 from merge_cosim.ngsim.encounters import at_site_point, site_encounters
 from merge_cosim.ngsim.sites import SITES, site

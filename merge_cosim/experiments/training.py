@@ -9,8 +9,8 @@ import numpy as np
 
 from merge_cosim.encounter import Intention
 from merge_cosim.errors import UserError
+from merge_cosim.experiments.encounter_sources import Pairs
 from merge_cosim.experiments.judging import density_losses, judge
-from merge_cosim.experiments.scenario import Pairs
 from merge_cosim.experiments.sources import SourceChoice, pairs_of_site
 from merge_cosim.intention.training import fit
 from merge_cosim.ngsim.split import split_cars

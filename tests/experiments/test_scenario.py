@@ -1,8 +1,8 @@
 import pytest
 
 from merge_cosim.errors import UserError
+from merge_cosim.experiments.encounter_sources import Span
 from merge_cosim.experiments.methods import parse_variation
-from merge_cosim.experiments.scenario import Span
 
 
 @pytest.mark.parametrize(

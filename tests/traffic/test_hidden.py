@@ -14,7 +14,8 @@ from merge_cosim.cosim.plant import NumpyPlant
 from merge_cosim.cosim.scoring import Rules
 from merge_cosim.encounter import Intention
 from merge_cosim.experiments.drawn import drawn_encounters
-from merge_cosim.experiments.scenario import Drawn, load_scenario
+from merge_cosim.experiments.encounter_sources import Drawn
+from merge_cosim.experiments.scenario import load_scenario
 from merge_cosim.experiments.sources import load_encounters
 from merge_cosim.intention.base import estimators
 from merge_cosim.observation import Observation, Setting
