@@ -46,13 +46,13 @@ def run_all(data: Path, out: Path, jobs: int) -> tuple[pd.DataFrame, pd.DataFram
         rows.append(ResultFolder(out / name).results().to_pandas())
         if varied:
             facts.append(pd.read_csv(out / name / SCENES_CSV, keep_default_na=False))
-    return tuple(
-        pd.concat(parts).assign(
-            run=lambda f: [RUNS[key] for key in zip(f["scenario"], f["variation"], strict=True)],
-            kind=lambda f, column=column: f[column].map(kind),
-        )
-        for parts, column in ((rows, "case"), (facts, "scene"))
-    )  # type: ignore[return-value]
+    return _joined(rows, "case"), _joined(facts, "scene")
+
+
+def _joined(parts: list[pd.DataFrame], case: str) -> pd.DataFrame:
+    found = pd.concat(parts)
+    runs = [RUNS[key] for key in zip(found["scenario"], found["variation"], strict=True)]
+    return found.assign(run=runs, kind=found[case].map(kind))
 
 
 def markdown(head: list[str], lines: list[list[str]]) -> str:

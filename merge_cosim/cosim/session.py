@@ -21,6 +21,8 @@ LANE_CHANGE_MODE_NONE = 0
 """SUMO changes no lane by itself."""
 SPEED_MODE_SUMO, LANE_CHANGE_MODE_SUMO = 31, 1621
 """What SUMO sets itself: it checks everything, and changes lanes as its models wish."""
+SPEED_OF_SUMO = -1.0
+"""The commanded speed that gives a car back to its car-following model."""
 _NO_REASON = "Process Error"
 """What libsumo raises where it has told the reason elsewhere."""
 _VIEW, _ZOOM = "View #0", 1500.0

@@ -6,7 +6,9 @@ scene exactly the encounter's stations.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +79,14 @@ class LoggedScene:
     def present(self, cycle: int) -> IntArray:
         """The cars that are logged in a cycle."""
         return np.flatnonzero((self.enters <= cycle) & (cycle <= self.last))
+
+    @cached_property
+    def digest(self) -> str:
+        """A short hash of all cars' ways."""
+        held = hashlib.sha256()
+        for values in (self.enters, self.offsets, self.length, self.x, self.lane):
+            held.update(np.ascontiguousarray(values).tobytes())
+        return held.hexdigest()[:16]
 
     def index(self, name: str) -> int:
         """Number of a car by its name.

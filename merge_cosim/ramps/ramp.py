@@ -152,9 +152,10 @@ class Ramp:
         own = tuple(section.edge for section in self.ramp if section.end <= 0.0)
         return own + tuple(section.edge for section in self.main if section.start >= 0.0)
 
-    def lanes_of(self, edge: str) -> tuple[str, ...]:
-        """SUMO ids of an edge's lanes, from the right."""
-        return tuple(str(lane.getID()) for lane in read_net(self.net).getEdge(edge).getLanes())
+    def lanes_of(self, *edges: str) -> tuple[str, ...]:
+        """SUMO ids of the lanes of some edges, from the right."""
+        net = read_net(self.net)
+        return tuple(str(lane.getID()) for edge in edges for lane in net.getEdge(edge).getLanes())
 
     def next_edges(self, edge: str, lane: int) -> tuple[str, ...]:
         """Where a lane leads to: edge ids, sorted."""

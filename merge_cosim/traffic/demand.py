@@ -154,19 +154,18 @@ def _exit_route(ramp: Ramp) -> tuple[str, ...]:
 
 def _signs(demand: Demand, ramp: Ramp, prefixes: list[str]) -> etree._Element:
     root = element("additional", {})
-    own = [section.edge for section in ramp.ramp if section.edge not in ramp.main_route]
-    past = [section.edge for section in ramp.main if section.start >= min(ramp.auxiliary_end, ramp.main[-1].start)]
-    for prefix in prefixes:
-        if demand.ramp_speed:
-            steps = [(0.0, demand.ramp_speed)]
-            root.extend(_sign(prefix + lane, steps) for edge in own for lane in ramp.lanes_of(edge))
-        if demand.wave_every:
-            steps = [(0.0, ramp.speed_limit)]
-            begin = demand.wave_every
-            while begin < demand.duration:
-                steps += [(begin, demand.wave_speed), (begin + demand.wave_lasts, ramp.speed_limit)]
-                begin += demand.wave_every
-            root.extend(_sign(prefix + lane, steps) for edge in past for lane in ramp.lanes_of(edge))
+    if demand.ramp_speed:
+        own = [section.edge for section in ramp.ramp if section.edge not in ramp.main_route]
+        steps = [(0.0, demand.ramp_speed)]
+        root.extend(_sign(prefix + lane, steps) for lane in ramp.lanes_of(*own) for prefix in prefixes)
+    if demand.wave_every:
+        past = [section.edge for section in ramp.main if section.start >= min(ramp.auxiliary_end, ramp.main[-1].start)]
+        steps = [(0.0, ramp.speed_limit)]
+        begin = demand.wave_every
+        while begin < demand.duration:
+            steps += [(begin, demand.wave_speed), (begin + demand.wave_lasts, ramp.speed_limit)]
+            begin += demand.wave_every
+        root.extend(_sign(prefix + lane, steps) for lane in ramp.lanes_of(*past) for prefix in prefixes)
     return root
 
 

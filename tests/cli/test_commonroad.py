@@ -164,9 +164,8 @@ def test_the_place_on_earth_is_the_nets(exported):
     assert [-location.x_translation, -location.y_translation] == offset
 
 
+@pytest.mark.parametrize("exported", ["us101"], indirect=True)  # the example reads the file of US-101
 def test_the_pages_example_runs(exported):
-    if exported.ramp.name != "us101":
-        pytest.skip("the example reads the file of US-101")
     page = (Path(__file__).parents[2] / "docs/sumo-tools.md").read_text()
     assert f"merge-cosim export {' '.join(CASES['us101'])} --out cr --commonroad" in page
     assert " ".join(CASES["designed"]) in page

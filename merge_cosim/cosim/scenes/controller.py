@@ -15,13 +15,12 @@ from merge_cosim.cosim.loop import Driver
 from merge_cosim.cosim.scenes.bank import Bank
 from merge_cosim.cosim.scenes.lanes import Part, RampLanes
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Ending, Meeting
+from merge_cosim.cosim.scenes.neighbours import SIGHT
 from merge_cosim.cosim.scenes.notes import Event, Notes
 from merge_cosim.cosim.scenes.roster import Actor, Roster
+from merge_cosim.cosim.scoring import Rules
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
-
-SIGHT = 150.0
-"""How far a host sees its leader and its follower in its lane [m]."""
 
 
 class HostController:
@@ -46,7 +45,7 @@ class HostController:
         driver: Driver,
         setting: Setting,
         attention: Attention = DEFAULT_ATTENTION,
-        horizon: float = 4.0,
+        horizon: float = Rules.horizon,
         seed: int = 0,
         host: str = "",
     ) -> None:
@@ -83,7 +82,8 @@ class HostController:
         self._end_meetings()
         self._begin_meetings()
         hosts = [host for host in self._roster.hosts.values() if host.driven]
-        wanted, ahead, behind = self._by_leader(hosts)
+        wanted, ahead = self._by_leader(hosts)
+        behind = {name: self._follower_gap(name) for name in {meeting.host.name for meeting in self._open}}
         contact = set(self._api.simulation.getCollidingVehiclesIDList()) if self._open else set()
         for bank in self._banks:
             for meeting, log_odds, acceleration in bank.decide(self._ramp.merging_point):
@@ -118,27 +118,28 @@ class HostController:
         """Teleports so far, as SUMO counts them."""
         return int(self._api.simulation.getParameter("", "stats.teleports.total"))
 
-    def _by_leader(
-        self, hosts: list[Actor]
-    ) -> tuple[dict[str, float], dict[str, tuple[float, float]], dict[str, float]]:
-        """By each host's name: acceleration behind its leader [m/s^2]; the leader's gap and speed; the follower's gap.
+    def _by_leader(self, hosts: list[Actor]) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+        """By each host's name: acceleration behind its leader [m/s^2]; the leader's gap and speed [m, m/s].
 
         SUMO's gaps leave out the minimum gap of the car behind; here they are from bumper to bumper.
         """
         vehicle = self._api.vehicle
-        ahead, behind = {}, {}
+        ahead = {}
         for host in hosts:
             name, gap = vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
             ahead[host.name] = (gap + host.min_gap, vehicle.getSpeed(name)) if name else (math.inf, 0.0)
-            name, gap = vehicle.getFollower(host.name, SIGHT)
-            behind[host.name] = gap + vehicle.getMinGap(name) if name else math.inf
         speed = np.array([host.speed for host in hosts])
         gap, leader_speed = np.array(list(ahead.values())).reshape(-1, 2).T
         free = self._law.free(speed, self._setting.speed_limit)
         led = np.isfinite(gap)
         keep = self._law.follow(np.where(led, gap, 0.0), speed, leader_speed)
         wanted = self._law.clip(np.where(led, np.minimum(keep, free), free))
-        return dict(zip(ahead, wanted.tolist(), strict=True)), ahead, behind
+        return dict(zip(ahead, wanted.tolist(), strict=True)), ahead
+
+    def _follower_gap(self, host: str) -> float:
+        """Gap to the car behind a host, bumper to bumper [m]; inf without one."""
+        name, gap = self._api.vehicle.getFollower(host, SIGHT)
+        return float(gap + self._api.vehicle.getMinGap(name)) if name else math.inf
 
     def _end_meetings(self) -> None:
         """Take in lane changes, end what is over, and forget the merging cars that nobody will meet any more."""

@@ -74,14 +74,17 @@ class RampLanes:
         return _Joint((before, gore), (link, gore))
 
     @cached_property
+    def _edges(self) -> frozenset[str]:
+        return frozenset(section.edge for section in self._ramp.main + self._ramp.ramp)
+
+    @cached_property
     def _own_edges(self) -> frozenset[str]:
         return frozenset(section.edge for section in self._ramp.ramp) - set(self._ramp.main_route)
 
     def _plain(self, name: str) -> tuple[str, str]:
         """Prefix of the copy and the edge's own id."""
-        own = {*self._ramp.main_route, *(section.edge for section in self._ramp.ramp)}
         tile = _TILE.fullmatch(name)
-        return ("", name) if name in own or tile is None else (tile[1], tile[2])
+        return ("", name) if tile is None or name in self._edges else (tile[1], tile[2])
 
     def _find(self, lane: str) -> RampLane | None:
         name, _, index = lane.rpartition("_")

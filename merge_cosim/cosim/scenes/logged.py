@@ -11,17 +11,17 @@ import numpy as np
 from merge_cosim.cosim.scenes.drivers import LOGGED_TYPE, ReleasedDrivers
 from merge_cosim.cosim.scenes.nearness import Places, in_conflict, near
 from merge_cosim.cosim.scenes.roadway import Roadway, Strip
-from merge_cosim.cosim.session import LANE_CHANGE_MODE_NONE, SPEED_MODE_UNCHECKED
+from merge_cosim.cosim.session import (
+    LANE_CHANGE_MODE_NONE,
+    LANE_CHANGE_MODE_SUMO,
+    SPEED_MODE_SUMO,
+    SPEED_MODE_UNCHECKED,
+    SPEED_OF_SUMO,
+)
 from merge_cosim.ngsim.scenes import LoggedScene
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.units import DT, BoolArray, FloatArray, IntArray
 
-SPEED_MODE_CHECKED = 31
-"""SUMO's default: all checks."""
-LANE_CHANGE_MODE_OWN = 1621
-"""SUMO's default: all of its own reasons to change lanes, and none that endangers others."""
-SUMO_SPEED = -1.0
-"""The speed that gives a car back to its car-following model."""
 _COLORS = {"logged": (150, 160, 170, 255), "released": (240, 160, 30, 255)}
 
 
@@ -107,9 +107,9 @@ class LoggedTraffic:
         """
         self._let_go(car)
         vehicle = self._api.vehicle
-        vehicle.setSpeedMode(car, SPEED_MODE_CHECKED)
-        vehicle.setLaneChangeMode(car, LANE_CHANGE_MODE_OWN)
-        vehicle.setSpeed(car, SUMO_SPEED)
+        vehicle.setSpeedMode(car, SPEED_MODE_SUMO)
+        vehicle.setLaneChangeMode(car, LANE_CHANGE_MODE_SUMO)
+        vehicle.setSpeed(car, SPEED_OF_SUMO)
         vehicle.setColor(car, _COLORS["released"])
         self.released.append(car)
 

@@ -8,6 +8,9 @@ from typing import NamedTuple
 
 from merge_cosim.units import TOLERANCE
 
+SIGHT = 150.0
+"""How far a host sees its leader and its follower in its lane [m]."""
+
 
 class InLane(NamedTuple):
     """A car in the host's lane.

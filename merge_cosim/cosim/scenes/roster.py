@@ -11,6 +11,7 @@ from merge_cosim.cosim.session import (
     LANE_CHANGE_MODE_SUMO,
     SPEED_MODE_SUMO,
     SPEED_MODE_UNCHECKED,
+    SPEED_OF_SUMO,
 )
 from merge_cosim.cosim.tracks import DECIMALS
 from merge_cosim.ramps.routes import ROLE
@@ -146,7 +147,7 @@ class Roster:
         vehicle.setSpeedMode(host.name, SPEED_MODE_UNCHECKED if method else SPEED_MODE_SUMO)
         vehicle.setLaneChangeMode(host.name, LANE_CHANGE_MODE_NONE if method else LANE_CHANGE_MODE_SUMO)
         if not method:
-            vehicle.setSpeed(host.name, -1.0)
+            vehicle.setSpeed(host.name, SPEED_OF_SUMO)
 
     def _type_role(self, kind: str) -> str:
         if kind not in self._role_of_type:

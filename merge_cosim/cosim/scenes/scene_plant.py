@@ -18,7 +18,7 @@ from merge_cosim.cosim.loop import Driver
 from merge_cosim.cosim.plant import COLORS
 from merge_cosim.cosim.scenes.full_scene import FullScene
 from merge_cosim.cosim.scenes.logged import LoggedTraffic
-from merge_cosim.cosim.scenes.neighbours import InLane, Neighbours
+from merge_cosim.cosim.scenes.neighbours import SIGHT, InLane, Neighbours
 from merge_cosim.cosim.scenes.roadway import Roadway
 from merge_cosim.cosim.session import SumoOptions, follow, libsumo_started, traci_started
 from merge_cosim.encounter import Encounters
@@ -29,8 +29,6 @@ from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import view_options
 from merge_cosim.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
 
-SIGHT = 150.0
-"""How far the host sees its leader and its follower [m]."""
 Place = tuple[LoggedScene, PairInScene]
 """The scene of an encounter, and where the encounter lies in it."""
 
