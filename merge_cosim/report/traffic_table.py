@@ -25,6 +25,10 @@ COLUMNS = (
     Column("meetings_scored", "scored", 0, "hosts"),
     Column("merging_stopped", "merging car stopped", 0, "hosts"),
     Column("host_contacts", "contacts", 0, "hosts"),
+    Column("cars", "at the start, mean", 1, "logged cars"),
+    Column("released", "released", 0, "logged cars"),
+    Column("blocked", "no room", 0, "logged cars"),
+    Column("driven_through", "drove into a host", 0, "logged cars"),
     Column("teleports", "teleports", 0, "events"),
     Column("two_hosts", "two hosts at once", 0, "events"),
     Column("hosts_off_lane", "off the host lane", 0, "events"),
@@ -40,9 +44,9 @@ def traffic_table(rows: Sequence[dict[str, Any]]) -> Table | None:
     """
     if not rows:
         return None
-    frame = pd.DataFrame(rows)
+    frame = pd.DataFrame(rows).reindex(columns=[column.name for column in COLUMNS])
     numbers = [column.name for column in COLUMNS if column.decimals is not None]
-    frame[numbers] = frame[numbers].astype(float)
+    frame[numbers] = frame[numbers].apply(pd.to_numeric)
     frame["variation"] = frame["variation"].replace("", None)
     order = {method: place for place, method in enumerate(in_order(frame["method"]))}
     frame = frame.sort_values(

@@ -1,10 +1,14 @@
 """Full-scene replay through the real command line, on the surrogate."""
 
+import csv
 import json
 
 import pytest
 from command import merge_cosim
 from lxml import etree
+from scene_files import small_scene
+
+from merge_cosim.files import shipped
 
 CASE = "surrogate_1-112.1-h106.1"
 
@@ -34,6 +38,26 @@ def test_a_case_runs_alone_among_the_cars_of_its_recording(tmp_path):
     deaf = run(tmp_path, "us101-scene", "--set", "full_scene.heed_leader=false")
     assert deaf["distance_m"] == pytest.approx(alone["distance_m"], abs=1e-6)
     assert deaf["delay_s"] == pytest.approx(alone["delay_s"], abs=1e-6)
+
+
+@pytest.mark.slow
+def test_a_sweep_with_living_traffic_beside_it_and_its_report(tmp_path):
+    (tmp_path / "few.toml").write_text(
+        (shipped("scenarios") / "us101-scene.toml").read_text().replace("[encounters]", "[encounters]\nfraction = 0.99")
+    )
+    small_scene(tmp_path)
+    how = ("few.toml", "minute.toml", "--source", "surrogate", "--method", "acc")
+    done = merge_cosim("sweep", *how, "--out", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with (tmp_path / "out/traffic.csv").open(newline="") as lines:
+        logged, living = csv.DictReader(lines)
+    assert float(logged["cars"]) > 10
+    assert (logged["hosts"], logged["throughput_veh_h"]) == ("", "")  # nobody counted them
+    assert (living["cars"], living["released"]) == ("", "")
+    assert float(living["hosts"]) > 0
+    report = merge_cosim("report", "out", cwd=tmp_path)
+    assert report.returncode == 0, report.stderr
+    assert "drove into a host" in (tmp_path / "out/report.html").read_text()
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import pandas as pd
 from merge_cosim.experiments.store import NOTES_CSV, SCENES_CSV, TRAFFIC_CSV
 
 GROUP = ["scenario", "variation", "method", "model"]
-MEANS = ("throughput_veh_h", "mean_speed", "time_loss_s")
-"""Facts whose mean over scenes is told; all other facts are counted together."""
+MEANS = ("throughput_veh_h", "mean_speed", "time_loss_s", "cars")
+"""Facts whose mean over scenes is told; all other facts are summed. A fact that a kind of scene lacks is missing."""
 
 
 def scene_tables(scenes: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
@@ -28,8 +28,11 @@ def scene_tables(scenes: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
     facts = pd.DataFrame([{k: v for k, v in scene.items() if k != "notes"} for scene in scenes])
     if not len(facts):
         return dict.fromkeys((SCENES_CSV, TRAFFIC_CSV, NOTES_CSV), facts)
-    how = {name: "mean" if name in MEANS else "sum" for name in facts.columns if name not in (*GROUP, "scene", "seed")}
-    traffic = facts.groupby(GROUP, sort=True).agg({"scene": "count", **how}).rename(columns={"scene": "scenes"})
+    groups = facts.groupby(GROUP, sort=True)
+    columns = [groups["scene"].count().rename("scenes")]
+    for name in facts.columns.difference([*GROUP, "scene", "seed"], sort=False):
+        columns.append(groups[name].mean() if name in MEANS else groups[name].sum(min_count=1))
+    traffic = pd.concat(columns, axis=1)
     facts = facts.sort_values([*GROUP, "scene"], ignore_index=True)
     found = pd.DataFrame(notes).sort_values([*GROUP[:3], "scene"], kind="stable") if notes else pd.DataFrame()
     return {SCENES_CSV: facts, TRAFFIC_CSV: traffic.round(3).reset_index(), NOTES_CSV: found}
