@@ -7,11 +7,11 @@ model learned, and what the estimators believe.
 """
 
 import argparse
-import re
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+
+from blocks import filled, table
 
 from merge_cosim.control.base import controllers
 from merge_cosim.intention.base import estimators
@@ -20,14 +20,7 @@ from merge_cosim.registry import parameters as defaults
 
 DOCS = Path(__file__).parent.parent / "docs"
 MODEL = "us101-ngsim"
-BLOCK = re.compile(r"<!-- (?P<kind>\w+): (?P<argument>[^>]+) -->\n.*?<!-- end -->", re.DOTALL)
 REGISTRIES: dict[str, Registry] = {"estimator": estimators, "controller": controllers}
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> str:
-    """A Markdown table, its first columns to the left, the others to the right."""
-    lines = [head, [*["---"] * left, *["---:"] * (len(head) - left)], *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
 def parameters(argument: str) -> str:
@@ -61,17 +54,6 @@ def densities(argument: str, data: Path | None = None) -> str | None:
     )
     head = ["speeds", "intention", "V(t-1) [m/s]", "transitions", "ruled out by the histogram", *DENSITIES]
     return about + table(head, rows, left=2)
-
-
-def filled(text: str, kinds: Mapping[str, Callable[[str], str | None]]) -> str:
-    """A page with its blocks of these kinds filled anew; the others stay."""
-
-    def fill(block: re.Match[str]) -> str:
-        kind, argument = block["kind"], block["argument"]
-        made = kinds[kind](argument) if kind in kinds else None
-        return block[0] if made is None else f"<!-- {kind}: {argument} -->\n{made}<!-- end -->"
-
-    return BLOCK.sub(fill, text)
 
 
 def draw() -> None:

@@ -5,24 +5,25 @@ from `REPRODUCTION/tables/NAME.csv`, a folder that `merge-cosim reproduce` wrote
 """
 
 import argparse
-import re
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
+from blocks import filled, table
 
 PAGE = Path(__file__).parent.parent / "docs" / "results.md"
-BLOCK = re.compile(r"<!-- table: (?P<name>\S+)(?: (?P<columns>\S+))? -->\n.*?<!-- end -->", re.DOTALL)
 
 
-def table(file: Path, columns: str | None) -> str:
-    """A CSV file, or some of its columns, as a Markdown table; rates with two decimals."""
-    rows = pd.read_csv(file)
+def shown(folder: Path, argument: str) -> str:
+    """A table of the folder, or some of its columns, as a Markdown table; rates with two decimals."""
+    name, _, columns = argument.partition(" ")
+    rows = pd.read_csv(folder / "tables" / f"{name}.csv")
     rows = rows[columns.split(",")] if columns else rows
-    heads = [str(name).replace("_", " ") for name in rows]
-    lines = [heads, ["---"] * len(heads)]
-    for values in rows.itertuples(index=False):
-        lines.append(["–" if pd.isna(v) else f"{v:.2f}" if isinstance(v, float) else str(v) for v in values])
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    cells = [
+        ["–" if pd.isna(v) else f"{v:.2f}" if isinstance(v, float) else str(v) for v in values]
+        for values in rows.itertuples(index=False)
+    ]
+    return table([str(name).replace("_", " ") for name in rows], cells, left=len(rows.columns))
 
 
 def main() -> None:
@@ -30,12 +31,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="folder that merge-cosim reproduce wrote")
     folder = parser.parse_args().folder
-
-    def fill(block: re.Match[str]) -> str:
-        head = block[0].partition("\n")[0]
-        return f"{head}\n{table(folder / 'tables' / (block['name'] + '.csv'), block['columns'])}<!-- end -->"
-
-    PAGE.write_text(BLOCK.sub(fill, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), {"table": partial(shown, folder)}), encoding="utf-8")
 
 
 if __name__ == "__main__":

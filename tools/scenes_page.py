@@ -5,12 +5,12 @@ on; one that is there already and the same is not run again. Beside `full_scene`
 """
 
 import argparse
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from blocks import filled, table
 
 from merge_cosim.experiments.full_scenes import SceneReplay
 from merge_cosim.experiments.plan import SweepRequest, plan
@@ -19,7 +19,6 @@ from merge_cosim.experiments.sweep import sweep
 from merge_cosim.ramps.ramp import Ramp
 
 PAGE = Path(__file__).parent.parent / "docs" / "scenes.md"
-BLOCK = re.compile(r"<!-- table: (?P<name>\S+) -->\n.*?<!-- end -->", re.DOTALL)
 METHODS = ("acc", "slot", "pgm", "fg", "ipcb", "always-go", "always-yield")
 ALONE, LOG, RELEASED, BLIND = "the pair alone", "log", "released", "log, leader not heeded"
 RUNS = {
@@ -55,17 +54,12 @@ def _joined(parts: list[pd.DataFrame], case: str) -> pd.DataFrame:
     return found.assign(run=runs, kind=found[case].map(kind))
 
 
-def markdown(head: list[str], lines: list[list[str]]) -> str:
-    """A Markdown table, numbers to the right."""
-    return "".join(f"| {' | '.join(line)} |\n" for line in [head, ["---", *["---:"] * (len(head) - 1)], *lines])
-
-
 def by_method(frame: pd.DataFrame, runs: tuple[str, ...], cell: Callable[[pd.DataFrame], str], what: str = "") -> str:
     """One row per method, one column per kind of recording and run."""
     columns = [(one, run) for one in ("fragments", "episodes") for run in runs]
     groups = dict(list(frame.groupby(["method", "kind", "run"])))
     lines = [[method, *(cell(groups[method, *column]) for column in columns)] for method in METHODS]
-    return markdown([what, *(f"{one}: {run}" for one, run in columns)], lines)
+    return table([what, *(f"{one}: {run}" for one, run in columns)], lines)
 
 
 def failures(rows: pd.DataFrame) -> str:
@@ -108,7 +102,7 @@ def starts(batch: SceneReplay) -> str:
     found: dict[str, list[float]] = {"fragments": [], "episodes": []}
     for number in range(len(batch)):
         plant.place(np.array([0]), batch.encounters, np.array([number]))
-        gap = plant.neighbours.leader_gap / float(plant.host_speed[0])
+        gap = plant.neighbours.leader_gap / float(plant.state[2, 0])
         found[kind(batch.case(number))].append(gap)
     plant.close()
     lines = []
@@ -116,7 +110,7 @@ def starts(batch: SceneReplay) -> str:
         led = np.array([gap for gap in gaps if np.isfinite(gap)])
         below = [str(int((led < limit).sum())) for limit in (1.0, 1.5)]
         lines.append([name, str(len(gaps)), str(len(led)), f"{np.median(led):.1f}", *below])
-    return markdown(["", "cases", "with a leader", "its time gap, median [s]", "below 1 s", "below 1.5 s"], lines)
+    return table(["", "cases", "with a leader", "its time gap, median [s]", "below 1 s", "below 1.5 s"], lines)
 
 
 def fullness(batch: SceneReplay) -> str:
@@ -130,7 +124,7 @@ def fullness(batch: SceneReplay) -> str:
         missing = sum(int(scene.length_missing.sum()) for scene in scenes)
         seconds, count = (f"{v.min():.0f}" if len(v) == 1 else f"{v.min():.0f}–{v.max():.0f}" for v in (lengths, cars))
         lines.append([name, str(len(places)), seconds, count, f"{np.mean(at_start):.1f}", f"{missing} of {cars.sum()}"])
-    return markdown(
+    return table(
         ["recording", "test pairs", "length [s]", "cars", "cars at a pair's start, mean", "without a length"], lines
     )
 
@@ -163,10 +157,8 @@ def main() -> None:
         "released": by_method(facts, (RELEASED,), handed),
     }
 
-    def fill(block: re.Match[str]) -> str:
-        return f"<!-- table: {block['name']} -->\n\n{tables[block['name']]}\n<!-- end -->"
-
-    PAGE.write_text(BLOCK.sub(fill, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    kinds = {"table": lambda name: f"\n{tables[name]}\n"}
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), kinds), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
     python tools/traffic_page.py [--from DIR]
 
 runs one `merge-cosim sweep` of the three traffic scenarios (about a quarter of an hour on two cores) and sets its
-summary, and its table of the traffic as a whole, between the page's marks.
+summary, and its table of the traffic as a whole, into the page's block.
 """
 
 import argparse
@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import pandas as pd
+from blocks import filled, table
 
 from merge_cosim.experiments.statistics.rates import wilson
 from merge_cosim.report.methods import in_order
@@ -22,7 +23,6 @@ SCENARIOS = ("traffic-light", "traffic-dense", "traffic-stop-and-go")
 METHODS = ("acc", "slot", "slot-time", "pgm", "pgm-time", "fg-time", "ipcb", "ipcb+acc", "dbn-pf")
 BOUNDS = ("always-go", "always-yield")
 PAGE = Path(__file__).parent.parent / "docs" / "traffic.md"
-BEGIN, END = "<!-- tables: begin -->\n", "<!-- tables: end -->\n"
 
 
 def command(out: str) -> list[str]:
@@ -48,19 +48,17 @@ def main() -> None:
         f"{int(traffic['scenes'].sum())} scenes, {manifest['real_time_factor']:.0f} times real time in each of "
         f"{manifest['command']['jobs']} processes."
     )
-    parts += ["", "### All three together", "", *together(summary, traffic)]
+    parts += ["", "### All three together", "", together(summary, traffic)]
     for scenario in SCENARIOS:
-        parts += ["", f"### {scenario}", ""]
-        parts += table(summary[summary["scenario"] == scenario], traffic[traffic["scenario"] == scenario])
-    text = PAGE.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    PAGE.write_text(head + BEGIN + "\n".join(parts) + "\n" + END + tail, encoding="utf-8")
+        own = [rows[rows["scenario"] == scenario] for rows in (summary, traffic)]
+        parts += [f"### {scenario}", "", by_method(*own)]
+    made = "\n".join([*parts, ""])
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), {"tables": lambda _: made}), encoding="utf-8")
 
 
-def together(summary: pd.DataFrame, traffic: pd.DataFrame) -> list[str]:
+def together(summary: pd.DataFrame, traffic: pd.DataFrame) -> str:
     """Failures, stopped merging cars and contacts of hosts, by method."""
-    lines = ["| method | failures of n (Wilson 95 %) | merging car stopped | contacts of hosts |", "|---" * 4 + "|"]
+    lines = []
     failures = summary.groupby("method")[["failures", "n"]].sum()
     whole = traffic.groupby("method")[["merging_stopped", "meetings", "host_contacts"]].sum().astype(int)
     for method in in_order(summary["method"]):
@@ -68,17 +66,13 @@ def together(summary: pd.DataFrame, traffic: pd.DataFrame) -> list[str]:
         low, high = wilson(int(failed), int(n))
         one = whole.loc[method]
         stopped = f"{one['merging_stopped']} of {one['meetings']}"
-        lines.append(f"| {method} | {failed} of {n} ({low:.1f}–{high:.1f} %) | {stopped} | {one['host_contacts']} |")
-    return lines
+        lines.append([method, f"{failed} of {n} ({low:.1f}–{high:.1f} %)", stopped, str(one["host_contacts"])])
+    return table(["method", "failures of n (Wilson 95 %)", "merging car stopped", "contacts of hosts"], lines)
 
 
-def table(summary: pd.DataFrame, traffic: pd.DataFrame) -> list[str]:
+def by_method(summary: pd.DataFrame, traffic: pd.DataFrame) -> str:
     """One row per method: its meetings, and the traffic as a whole."""
-    lines = [
-        "| method | failures of n (Wilson 95 %) | censored | D m | delay s | braking m/s² | leader gap m "
-        "| follower gap m | merging car stopped | contacts of hosts | cars out per h | time lost s |",
-        "|---" * 12 + "|",
-    ]
+    lines = []
     rows, whole = summary.set_index("method"), traffic.set_index("method")
     for method in in_order(summary["method"]):
         one, all_cars = rows.loc[method], whole.loc[method]
@@ -93,10 +87,14 @@ def table(summary: pd.DataFrame, traffic: pd.DataFrame) -> list[str]:
             f"{all_cars['throughput_veh_h']:.0f}",
             f"{all_cars['time_loss_s']:.2f}",
         ]
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+        lines.append(cells)
+    return table(HEAD, lines)
 
 
+HEAD = (
+    *("method", "failures of n (Wilson 95 %)", "censored", "D m", "delay s", "braking m/s²", "leader gap m"),
+    *("follower gap m", "merging car stopped", "contacts of hosts", "cars out per h", "time lost s"),
+)
 MEASURES = (
     ("distance_m", 1),
     ("delay_s", 2),
