@@ -27,7 +27,7 @@ How fast merge-cosim is on one machine, made by
 
 on {date}: {machine}.
 
-{load}Times are wall times; loops and estimators take turns, and the median of {rounds} is shown. Absolute times swing
+{load}Times are wall times; loops, estimators and sweeps take turns, and the median of {rounds} is shown. Absolute times swing
 with what else the machine does; ratios of one run hold better.
 """
 LOOPS = """## One process against SUMO's bare steps, and against the obvious alternatives
@@ -84,7 +84,7 @@ def bench(
         "estimators": estimator_costs(rounds),
         "copies": copies,
         "scenes": scene_costs(copies),
-        "scaling": scaling(sizes, sorted({1, several})),
+        "scaling": scaling(sizes, sorted({1, several}), rounds),
     }
 
 

@@ -17,13 +17,18 @@ from merge_cosim.experiments.store import MANIFEST
 SCENARIO, METHOD = "designed-random", "acc"
 
 
-def scaling(sizes: Sequence[int], processes: Sequence[int]) -> list[dict[str, Any]]:
-    """Run sweeps of the given sizes on the given numbers of processes, each by the real command.
+def scaling(sizes: Sequence[int], processes: Sequence[int], rounds: int) -> list[dict[str, Any]]:
+    """Run sweeps of the given sizes on the given numbers of processes, each by the real command, in turns.
 
     Returns:
-        A row per sweep: wall time, its parts, time per case [ms], and the largest process's peak memory [MiB].
+        A row per size and number, that of the run with the median `run_s`: wall time, its parts, time per case [ms],
+        and the largest process's peak memory [MiB].
     """
-    return [_sweep(cases, jobs) for cases in sizes for jobs in processes]
+    runs: dict[tuple[int, int], list[dict[str, Any]]] = {(cases, jobs): [] for cases in sizes for jobs in processes}
+    for _ in range(rounds):
+        for kind, rows in runs.items():
+            rows.append(_sweep(*kind))
+    return [sorted(rows, key=lambda row: row["run_s"])[rounds // 2] for rows in runs.values()]
 
 
 def _sweep(cases: int, jobs: int) -> dict[str, Any]:
