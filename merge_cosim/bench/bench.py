@@ -27,8 +27,8 @@ How fast merge-cosim is on one machine, made by
 
 on {date}: {machine}.
 
-{load}Times are wall times; loops, estimators and sweeps take turns, and the median of {rounds} is shown. Absolute times
-swing with what else the machine does; ratios of one run hold better.
+{load}Times are wall times; loops, estimators and sweeps take turns, and the median of {rounds} is shown.
+Absolute times swing with what else the machine does; ratios of one run hold better.
 """
 LOOPS = """## One process against SUMO's bare steps, and against the obvious alternatives
 
