@@ -10,7 +10,8 @@ import sumolib
 from merge_cosim.errors import UserError
 from merge_cosim.ramps.definition import read_ramp_file
 
-_HEADER = re.compile(rb"\A(<\?xml[^>]*\?>)\s*<!--.*?-->\s*", re.DOTALL)
+HEAD = re.compile(rb"\A(<\?xml[^>]*\?>)\s*<!--.*?-->\s*", re.DOTALL)
+"""Head of a file that one of SUMO's programs has written: it names date, version and command."""
 
 
 def build(folder: Path) -> Path:
@@ -38,7 +39,7 @@ def built(settings: Path) -> bytes:
         target = Path(scratch) / "built.net.xml"
         netconvert(settings, "--configuration-file", str(settings), "--output-file", str(target))
         # The head names date, version and command, none of which belongs to the net.
-        return _HEADER.sub(rb"\1\n\n", target.read_bytes())
+        return HEAD.sub(rb"\1\n\n", target.read_bytes())
 
 
 def netconvert(file: Path, *options: str) -> None:
