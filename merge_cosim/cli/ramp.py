@@ -97,15 +97,19 @@ def new(
     link: Annotated[
         str | None, typer.Option(metavar="EDGE", help="An edge of the on-ramp, where the file has several.")
     ] = None,
-    lanes: Annotated[int | None, typer.Option(min=1, help="Main lanes (1).")] = None,
-    ramp_lanes: Annotated[int | None, typer.Option(min=1, help="Lanes of the on-ramp (1).")] = None,
+    lanes: Annotated[int | None, typer.Option(min=1, max=20, help="Main lanes (1).")] = None,
+    ramp_lanes: Annotated[int | None, typer.Option(min=1, max=20, help="Lanes of the on-ramp (1).")] = None,
     acceleration_lane: Annotated[
-        float | None, typer.Option(min=0.0, help="Its length [m] (0: on-ramp and host's lane go on as one).")
+        float | None, typer.Option(min=0.0, max=1e5, help="Its length [m] (0: on-ramp and host's lane go on as one).")
     ] = None,
-    upstream: Annotated[float | None, typer.Option(min=1.0, help="Road and on-ramp before the gore [m] (500).")] = None,
-    downstream: Annotated[float | None, typer.Option(min=1.0, help="Road after the gore [m] (1500).")] = None,
-    speed_limit: Annotated[float | None, typer.Option(min=1.0, help="Speed limit [m/s] (29, or the file's).")] = None,
-    lane_width: Annotated[float | None, typer.Option(min=2.0, help="Width of every lane [m] (3.6).")] = None,
+    upstream: Annotated[
+        float | None, typer.Option(min=1.0, max=1e5, help="Road and on-ramp before the gore [m] (500).")
+    ] = None,
+    downstream: Annotated[float | None, typer.Option(min=1.0, max=1e5, help="Road after the gore [m] (1500).")] = None,
+    speed_limit: Annotated[
+        float | None, typer.Option(min=1.0, max=100.0, help="Speed limit [m/s] (29, or the file's).")
+    ] = None,
+    lane_width: Annotated[float | None, typer.Option(min=2.0, max=10.0, help="Width of every lane [m] (3.6).")] = None,
     as_json: Json = False,
 ) -> None:
     """Start a ramp of your own: from a few numbers, a SUMO net, or an extract of OpenStreetMap."""
@@ -132,7 +136,9 @@ def describe(
     link: Annotated[
         str | None, typer.Option(metavar="EDGE", help="An edge of the on-ramp, where the net has several.")
     ] = None,
-    speed_limit: Annotated[float | None, typer.Option(min=1.0, help="Speed limit [m/s] (the net's).")] = None,
+    speed_limit: Annotated[
+        float | None, typer.Option(min=1.0, max=100.0, help="Speed limit [m/s] (the net's).")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write a ramp.toml beside a net of your own, so that its configurations run; the net is left as it is."""

@@ -62,7 +62,12 @@ def ramp_from_osm(
         net_file = Path(scratch) / "extract.net.xml"
         types = Path(sumo.SUMO_HOME) / "data" / "typemap" / "osmNetconvert.typ.xml"
         files = ("--osm-files", str(extract), "--type-files", str(types), "--output-file", str(net_file))
-        netconvert(extract, *files, *OPTIONS)
+        try:
+            netconvert(extract, *files, *OPTIONS)
+        except UserError as error:
+            if str(error).endswith(("No nodes loaded.", "No edges loaded.")):
+                raise UserError(f"{extract}: no motorway, no trunk road and no link to either in it") from None
+            raise
         net = sumolib.net.readNet(str(net_file))
         unlimited = [edge.getID() for edge in net.getEdges() if "speed" in edge.getParam("osmDefaults", "").split()]
         origin = Origin(extract, GUESSED, unlimited)

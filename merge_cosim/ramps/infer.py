@@ -197,9 +197,10 @@ def _beside(lane: Lane, main: list[Lane]) -> tuple[list[Lane], Lane | None, str]
             return beside, None, "is no longer beside the host's"
         beside.append(further[0])
     length = sum(each.getLength() for each in beside)
+    keeps_left = "; left-hand traffic cannot be read" if lane.getIndex() > main[0].getIndex() else ""
     raise UserError(
         f"the on-ramp's lane {lane.getID()} goes on beside the road for {length:.0f} m, as far as was looked or the "
-        "net reaches: nobody has to merge; take a larger extract if it ends further on"
+        f"net reaches: nobody has to merge; take a larger extract if it ends further on{keeps_left}"
     )
 
 

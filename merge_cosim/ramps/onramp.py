@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import html
 import zlib
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -55,9 +56,12 @@ def read_source(path: Path, named: Path) -> sumolib.net.Net:
     if root.get("lefthand", "false").lower() in ("true", "1", "yes"):
         raise UserError(f"{named}: a net with left-hand traffic; only right-hand traffic can be read")
     try:
-        return sumolib.net.readNet(str(path))
+        net = sumolib.net.readNet(str(path))
     except Exception as error:  # sumolib passes on whatever its parser meets
         raise UserError(f"{named}: not a SUMO net: {error}") from None
+    for edge in net.getEdges():
+        edge._name = html.unescape(edge.getName() or "")  # netconvert escapes names of OpenStreetMap twice
+    return net
 
 
 def choose(net: sumolib.net.Net, link: str | None, upstream: float, downstream: float) -> tuple[Joint, Course]:
@@ -97,7 +101,8 @@ def _listed(net: sumolib.net.Net, upstream: float, downstream: float) -> str:
             "no on-ramp found: no edge of type motorway_link or trunk_link (or, in a net without such types, of fewer "
             "lanes or a lower limit) joins a main road at an acute angle; name the on-ramp's last edge with --link"
         )
-    return f"{len(shown)} on-ramps; choose one with --link: {', '.join(shown)}"
+    many = f"{len(shown)} on-ramps; choose one" if len(shown) > 1 else "the one on-ramp is chosen"
+    return f"{many} with --link: {', '.join(shown)}"
 
 
 def sources_of(joint: Joint, path: Course, length: float, origin: Origin, given: str | None) -> dict[str, str]:

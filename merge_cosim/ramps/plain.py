@@ -31,7 +31,7 @@ class PlainXml:
         self._net, self._layout, self._speed_limit = net, layout, speed_limit
         self._nodes = nodes(layout.roads)
         self._joins = not path.beside
-        self._merging = {lane.getID() for lane in (*path.ramp, *path.beside)}
+        self._merging = {lane.getEdge().getID(): lane.getIndex() for lane in path.beside}
 
     def nodes(self) -> str:
         """Content of the `.nod.xml`."""
@@ -92,10 +92,13 @@ class PlainXml:
             f'numLanes="{len(lanes)}" speed="{self._speed(lanes[-1], main):.2f}" spreadType="center"{alike} '
             f'length="{road.length:.2f}" shape="{_points(road.axis)}">'
         ]
+        # An on-ramp of several lanes brings as many, all on one side of the host's lane.
+        side = self._merging.get(road.edge.getID(), road.lane.getIndex()) - road.lane.getIndex()
         for lane in lanes:
             own = role
             if main:
-                own = "host" if lane is road.lane else "auxiliary" if lane.getID() in self._merging else "main"
+                from_host = lane.getIndex() - road.lane.getIndex()
+                own = "host" if not from_host else "auxiliary" if from_host * side > 0 else "main"
             rows.append(
                 f'    <lane index="{lane.getIndex()}" speed="{self._speed(lane, main):.2f}" '
                 f'width="{lane.getWidth():.2f}"{"" if alike else _closed(lane)}>'

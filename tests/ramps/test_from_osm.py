@@ -44,8 +44,12 @@ def test_an_acceleration_lane_as_mappers_draw_it(tmp_path: Path) -> None:
 
 
 def test_an_acceleration_lane_that_is_guessed_is_told(tmp_path: Path) -> None:
-    folder = ramp_from_osm(tmp_path / "mine", write(tmp_path, TEXT.replace('k="lanes" v="3"', 'k="lanes" v="2"')))
+    text = TEXT.replace('k="lanes" v="3"', 'k="lanes" v="2"').replace(
+        '"ref" v="A 97"', '"name" v="King\'s &amp; Queen\'s"'
+    )
+    folder = ramp_from_osm(tmp_path / "mine", write(tmp_path, text))
     file = read_ramp_file(folder)
+    assert file.title == "mine: on-ramp onto King's & Queen's"
     assert file.sources["acceleration_lane"] == "Guessed by netconvert, 100 m: extract.osm has none."
     assert Ramp.load(folder).auxiliary_end == pytest.approx(100.0, abs=1.0)
     assert any("braking comfortably (3.4 m/s^2) from 33.33 m/s takes 163 m" in line for line in notes(folder))
@@ -75,7 +79,7 @@ def test_a_compressed_extract_through_the_command(tmp_path: Path) -> None:
     ("text", "message"),
     [
         (TEXT.replace("motorway_link", "track"), "no on-ramp found"),
-        (TEXT.replace("motorway", "residential"), "extract.osm: "),
+        (TEXT.replace("motorway", "residential"), "extract.osm: no motorway, no trunk road"),
         (TEXT[: len(TEXT) // 2], "netconvert refuses it"),
         ("<net/>", "its root is <net>, not <osm>; a SUMO net goes with --from-net"),
         ("\0\0\0\rOSMHeader", "osmium cat"),
