@@ -73,7 +73,7 @@ def take_over_net(folder: Path, since: int) -> bool:
     with tempfile.TemporaryDirectory() as scratch:
         prefix = Path(scratch) / "net"
         # Without avoid-overlap, which is off for nets, the net that is built again would differ.
-        options = ("--geometry.avoid-overlap", "true", "--plain-output-prefix", str(prefix))
+        options = ("--geometry.avoid-overlap", "true", "--output.street-names", "--plain-output-prefix", str(prefix))
         netconvert(net, "--sumo-net-file", str(net), *options)
         for made, file in zip(_plain(prefix), plain, strict=True):
             file.write_bytes(HEAD.sub(rb"\1\n\n", made.read_bytes()))

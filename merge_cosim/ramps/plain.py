@@ -87,10 +87,11 @@ class PlainXml:
         name = f" name={quoteattr(road.edge.getName())}" if road.edge.getName() else ""
         closed = {_closed(lane) for lane in lanes}
         alike = closed.pop() if len(closed) == 1 else ""
+        # netedit's Save Plain XML forgets a width that all lanes of an edge have, unless the edge has it.
         rows = [
             f"<edge id={quoteattr(road.edge.getID())} from={quoteattr(road.start)} to={quoteattr(road.end)}{name} "
-            f'numLanes="{len(lanes)}" speed="{self._speed(lanes[-1], main):.2f}" spreadType="center"{alike} '
-            f'length="{road.length:.2f}" shape="{_points(road.axis)}">'
+            f'numLanes="{len(lanes)}" speed="{self._speed(lanes[-1], main):.2f}" width="{lanes[0].getWidth():.2f}" '
+            f'spreadType="center"{alike} length="{road.length:.2f}" shape="{_points(road.axis)}">'
         ]
         # An on-ramp of several lanes brings as many, all on one side of the host's lane.
         side = self._merging.get(road.edge.getID(), road.lane.getIndex()) - road.lane.getIndex()

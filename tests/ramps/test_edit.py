@@ -2,10 +2,14 @@ import os
 import time
 from pathlib import Path
 
-from test_ramp import copy_with
+import pytest
+from test_ramp import NAMES, copy_with
 
-from merge_cosim.ramps.build import build
+from merge_cosim.ramps.build import build, config, netconvert
 from merge_cosim.ramps.edit import take_over_net
+from merge_cosim.ramps.from_osm import ramp_from_osm
+
+EXTRACT = Path(__file__).parents[2] / "docs" / "files" / "rosenbach.osm"
 
 
 def test_a_net_that_was_saved_alone_becomes_plain_xml(tmp_path: Path) -> None:
@@ -22,3 +26,19 @@ def test_a_net_that_was_saved_alone_becomes_plain_xml(tmp_path: Path) -> None:
     assert not take_over_net(folder, later), "nothing was saved since"
     assert take_over_net(folder, started)
     assert build(folder).read_bytes() == saved, "georeference, lengths, shapes and parameters are kept"
+
+
+@pytest.mark.parametrize("name", [*NAMES, "mapped"])
+def test_plain_xml_that_sumo_has_written_builds_the_same_net(tmp_path: Path, name: str) -> None:
+    # What netedit's Save Plain XML does: read the sources, and write them anew over themselves.
+    if name == "mapped":
+        extract = tmp_path / "extract.osm"
+        extract.write_text(EXTRACT.read_text(encoding="utf-8").replace('"ref"', '"name"'), encoding="utf-8")
+        folder = ramp_from_osm(tmp_path / name, extract)
+    else:
+        folder = copy_with(tmp_path, "title", "title", name)
+    before = (folder / f"{name}.net.xml").read_bytes()
+    files = ("--output-file", str(tmp_path / "net.xml"), "--plain-output-prefix", str(folder / name))
+    netconvert(folder, "-c", str(config(folder)), *files)
+    assert b"generated on" in (folder / f"{name}.edg.xml").read_bytes()
+    assert build(folder).read_bytes() == before

@@ -61,7 +61,8 @@ def _edges(plan: Plan, speed_limit: float) -> str:
 def _edge(plan: Plan, edge: Edge, speed_limit: float) -> list[str]:
     rows = [
         f'    <edge id="{edge.name}" from="{edge.start}" to="{edge.end}" numLanes="{len(edge.lanes)}" '
-        f'speed="{speed_limit:.2f}" spreadType="center" length="{edge.length:.2f}"',
+        # netedit's Save Plain XML forgets a width that all lanes of an edge have, unless the edge has it.
+        f'speed="{speed_limit:.2f}" width="{edge.lanes[0][1]:.2f}" spreadType="center" length="{edge.length:.2f}"',
         f'          shape="{_points(plan.local(edge.shape.points))}">',
     ]
     for index, (role, width) in enumerate(edge.lanes):
