@@ -35,8 +35,8 @@ def open_editor(folder: Path, say: Callable[[str], object]) -> None:
     settings, started = config(folder), time.time_ns()
     kept = settings.read_bytes()
     # netedit's dialogues begin where the last one ended, perhaps among another ramp's files.
-    say(f"Save into {folder.resolve()}: File > Save Plain XML (Ctrl+L) over {_plain(settings)[1].name}, or")
-    say(f"Save Network (Ctrl+S) over {read_ramp_file(folder).net}. netedit writes the files anew, without comments.")
+    say(f"Save with File > Save Network (Ctrl+S) over {(folder / read_ramp_file(folder).net).resolve()};")
+    say("when netedit is closed, the plain XML is written anew from that, without comments.")
     say("Where a road's length changes, change its attribute 'length' and ramp.toml, too. Then close netedit and run:")
     say(f"merge-cosim ramp build {shlex.quote(str(folder))}")
     try:
@@ -73,7 +73,7 @@ def take_over_net(folder: Path, since: int) -> bool:
     with tempfile.TemporaryDirectory() as scratch:
         prefix = Path(scratch) / "net"
         # Without avoid-overlap, which is off for nets, the net that is built again would differ.
-        options = ("--geometry.avoid-overlap", "true", "--output.street-names", "--plain-output-prefix", str(prefix))
+        options = ("--geometry.avoid-overlap", "true", "--plain-output-prefix", str(prefix))
         netconvert(net, "--sumo-net-file", str(net), *options)
         for made, file in zip(_plain(prefix), plain, strict=True):
             file.write_bytes(HEAD.sub(rb"\1\n\n", made.read_bytes()))
