@@ -172,8 +172,9 @@ class Ramp:
     def holds(self, merge_position: FloatArray, host_station: FloatArray, merging_station: FloatArray) -> BoolArray:
         """Which encounters fit: merging point beside the ramp's lane, both starts on the net; shape (n,)."""
         beside = (merge_position >= 0.0) & (merge_position <= self.auxiliary_end)
-        start = np.minimum(host_station, merging_station) + merge_position
-        return beside & (start >= -self.upstream) & (host_station + merge_position < self.downstream)
+        host, merging = host_station + merge_position, merging_station + merge_position
+        on_net = (host >= self.main[0].start) & (merging >= self.ramp[0].start) & (host < self.downstream)
+        return np.asarray(beside & on_net)
 
     def place(self, path: Way, station: float, merge_position: float) -> LanePosition:
         """Where a front bumper at `station` [m] lies in the net.
@@ -248,7 +249,7 @@ def missing_lanes(net: sumolib.net.Net, file: RampFile) -> list[str]:
         for edge, lane in zip(edges, lanes, strict=True):
             if not net.hasEdge(edge):
                 problems.append(f"{key}: the net {file.net} has no edge '{edge}'")
-            elif not 0 <= lane < (count := net.getEdge(edge).getLaneNumber()):
+            elif lane not in range(count := net.getEdge(edge).getLaneNumber()):
                 problems.append(f"{key}: edge '{edge}' has no lane {lane}; its lanes are 0 ... {count - 1}")
     return problems
 

@@ -1,5 +1,6 @@
 """Many copies of a ramp side by side in one net, so that one SUMO steps a batch of encounters."""
 
+import gzip
 import hashlib
 from copy import deepcopy
 from pathlib import Path
@@ -39,7 +40,8 @@ def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
     key = hashlib.sha256(ingredients).hexdigest()[:16]
     target = cache_folder("tiles") / f"{ramp.name}-{count}-{key}.net.xml"
     if not target.is_file():
-        net = etree.fromstring(source, etree.XMLParser(remove_blank_text=True, remove_comments=True))
+        text = gzip.decompress(source) if ramp.net.suffix == ".gz" else source
+        net = etree.fromstring(text, etree.XMLParser(remove_blank_text=True, remove_comments=True))
         _leave_out_internal(net)
         if not whole:
             _reduce(net, ramp)

@@ -30,6 +30,7 @@ def test_shipped_ramps_have_no_problem(name: str) -> None:
         ("weave = 213.0", "weave = 355.0", "lengths.weave: built 213.00 m long, intended 355.00 m"),
         ("weave = 213.0\n", "", "lengths.weave: missing"),
         ("merging_point = 42.0", "merging_point = 180.0", "33 m of auxiliary lane after it, but 53 m to brake in"),
+        ("host_lane = [0, 1, 0]", "host_lane = [0, -1, 0]", "main: edge 'weave' has no lane -1; its lanes are 0 ... 5"),
         ('"weave_0"', '"weave_9"', "ngsim.lanes.6: the net us101.net.xml has no lane 'weave_9'"),
         ("speed_limit = 29.0", "", "speed_limit: missing; every ramp needs it"),
         ('["main_in", "weave", "main_out"]', '["weave", "main_in", "main_out"]', "gore must be an edge of main after"),

@@ -1,6 +1,7 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -88,6 +89,9 @@ def test_edges_of_awkward_lengths_end_exactly_at_the_gore(tmp_path: Path) -> Non
     assert ramp.ramp[-1].end == 0.0
     assert not ramp.changes_lane
     assert ramp.ramp_route == ("ramp0", "ramp1", "ramp", "main_out")
+    # The on-ramp reaches further back than the main road: each car needs room on its own path.
+    stations = np.array([-400.0, -500.2])
+    assert ramp.holds(np.zeros(2), stations, stations[::-1]).tolist() == [True, False]
     assert ramp.place("ramp", 0.0, 0.0) == LanePosition("main_out", 0, 0.0)
 
 

@@ -1,7 +1,9 @@
 """Tiles under a real SUMO: cars that are driven by speed stay exactly where their path coordinate says."""
 
+import gzip
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -148,3 +150,10 @@ def test_processes_may_build_the_same_tiles_at_once(tmp_path: Path, monkeypatch:
     with get_context("spawn").Pool(2) as pool:
         paths = set(pool.map(build_in_another_process, range(4), chunksize=1))
     assert [str(path) for path in (tmp_path / "tiles").iterdir()] == list(paths)
+
+
+def test_a_compressed_net_makes_the_same_tiles(tmp_path: Path) -> None:
+    ramp = Ramp.load("i80")
+    packed = tmp_path / "i80.net.xml.gz"
+    packed.write_bytes(gzip.compress(ramp.net.read_bytes()))
+    assert tile_net(replace(ramp, net=packed), 2).read_bytes() == tile_net(ramp, 2).read_bytes()
