@@ -16,7 +16,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from merge_cosim.errors import UserError
 
@@ -28,6 +28,7 @@ class Component(ABC):
         name: The name by which the command line, scenarios and tables call it.
     """
 
+    __pydantic_config__: ClassVar = ConfigDict(allow_inf_nan=False)
     name: ClassVar[str]
 
 

@@ -18,14 +18,14 @@ class FollowingLaw(ABC):
         d0: Gap at standstill [m].
         headway: Time headway T [s].
         min_acceleration: Hardest braking, negative [m/s^2].
-        max_acceleration: Hardest acceleration [m/s^2].
+        max_acceleration: Hardest acceleration [m/s^2], more than 0: free driving ends at the speed limit.
     """
 
     k_free: PositiveFloat = 0.4
     d0: NonNegativeFloat = 2.0
     headway: NonNegativeFloat = 1.5
     min_acceleration: NonPositiveFloat = -4.0
-    max_acceleration: NonNegativeFloat = 2.0
+    max_acceleration: PositiveFloat = 2.0
 
     def free(self, speed: FloatArray, speed_limit: float) -> FloatArray:
         """Acceleration [m/s^2] of a car that nobody hinders, before the bounds."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -24,9 +24,9 @@ from merge_cosim.traffic.demand import Demand
 
 
 class Strict(BaseModel):
-    """A part of a scenario file: a misspelt key is refused."""
+    """A part of a scenario file: a misspelt key is refused, and so is a number that is none."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, allow_inf_nan=False)
 
 
 def steps_between(first: float, last: float, step: float) -> int:
@@ -34,31 +34,44 @@ def steps_between(first: float, last: float, step: float) -> int:
     return math.floor((last - first) / step + 1e-9)
 
 
-class Span(Strict):
-    """Evenly spaced values: `from`, and so on in steps as far as `to`, which is included where a step meets it."""
+class Range(Strict):
+    """An interval.
+
+    Attributes:
+        first: Its lower end.
+        last: Its upper end.
+    """
 
     first: float = Field(alias="from")
     last: float = Field(alias="to")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.last < self.first:
+            raise ValueError(f"'to' is below 'from' ({self.last:g} < {self.first:g})")
+        return self
+
+
+class Span(Range):
+    """Evenly spaced values: `from`, and so on in steps as far as `to`, which is included where a step meets it."""
+
     step: PositiveFloat
 
     def values(self) -> list[float]:
         """All values, in order."""
         return [self.first + i * self.step for i in range(steps_between(self.first, self.last, self.step) + 1)]
 
-    @model_validator(mode="after")
-    def _upwards(self) -> Span:
-        if not self.first <= self.last < math.inf:
-            raise ValueError("'from' must not be greater than 'to', and both must be finite")
-        return self
+
+R = TypeVar("R", bound=Range)
 
 
-def _forwards(span: Span) -> Span:
-    if span.first < 0:
+def _forwards(speeds: R) -> R:
+    if speeds.first < 0:
         raise ValueError("a speed must not be negative")
-    return span
+    return speeds
 
 
-Speeds = Annotated[Span, AfterValidator(_forwards)]
+Speeds = AfterValidator(_forwards)
 
 
 class Grid(Strict):
@@ -75,27 +88,9 @@ class Grid(Strict):
     kind: Literal["grid"]
     merging_station: Annotated[float, Field(lt=0)] = -90.0
     host_offset: Span
-    host_speed: Speeds
-    merging_speed: Speeds
+    host_speed: Annotated[Span, Speeds]
+    merging_speed: Annotated[Span, Speeds]
     length: PositiveFloat = 5.0
-
-
-class Range(Strict):
-    """An interval.
-
-    Attributes:
-        first: Its lower end.
-        last: Its upper end.
-    """
-
-    first: float = Field(alias="from")
-    last: float = Field(alias="to")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Range:
-        if self.last < self.first:
-            raise ValueError(f"'to' is below 'from' ({self.last:g} < {self.first:g})")
-        return self
 
 
 class Random(Strict):
@@ -108,8 +103,8 @@ class Random(Strict):
         seed: Seed of the draw.
         merging_station: The merging car's initial station [m].
         host_offset: The host's initial station minus the merging car's [m]; positive is ahead.
-        host_speed: The host's initial speed [m/s].
-        merging_speed: The merging car's initial speed [m/s].
+        host_speed: The host's initial speed [m/s], not negative.
+        merging_speed: The merging car's initial speed [m/s], not negative.
         length: Length of both cars [m].
     """
 
@@ -118,8 +113,8 @@ class Random(Strict):
     seed: NonNegativeInt = 0
     merging_station: Annotated[float, Field(lt=0)] = -90.0
     host_offset: Range
-    host_speed: Range
-    merging_speed: Range
+    host_speed: Annotated[Range, Speeds]
+    merging_speed: Annotated[Range, Speeds]
     length: PositiveFloat = 5.0
 
 

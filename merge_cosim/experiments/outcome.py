@@ -14,7 +14,7 @@ from merge_cosim.cosim.scenes.scene_plant import AROUND
 from merge_cosim.cosim.scoring import GOAL, KINDS
 from merge_cosim.encounter import NEVER, Encounters, Intention
 from merge_cosim.observation import Setting
-from merge_cosim.units import AnyArray, BoolArray, FloatArray
+from merge_cosim.units import AnyArray, BoolArray, FloatArray, time_to_arrival
 
 SCHEMA_VERSION = "3"
 SCHEMA = pa.schema(
@@ -99,10 +99,6 @@ def result_rows(
         last_logged = encounters.log.merging_station.lengths - 1
         score_until = encounters.log.score_until
     unfinished = ~failed & ~c["scored_to_end"]
-    ambiguity = np.abs(
-        -encounters.merging_station / np.maximum(encounters.merging_speed, 0.5)
-        + np.minimum(encounters.host_station, 0.0) / np.maximum(encounters.host_speed, 0.5)
-    )
     columns: dict[str, AnyArray | pa.Array] = {
         "site": encounters.site,
         "source": encounters.source,
@@ -135,7 +131,10 @@ def result_rows(
         "host_reached_s": _finite(c["host_reached_s"]),
         "merging_reached_s": _finite(c["merging_reached_s"]),
         "end_s": c["end_cycle"] * dt,
-        "ambiguity_s": ambiguity,
+        "ambiguity_s": np.abs(
+            time_to_arrival(encounters.merging_station, encounters.merging_speed)
+            - time_to_arrival(encounters.host_station, encounters.host_speed)
+        ),
         "sumo_collision": c["sumo_collision"].astype(bool),
         **{name: _finite(c[name]) for name in AROUND if name in c},
         **more,

@@ -36,6 +36,8 @@ def test_fewer_cases_are_the_first_ones_and_another_seed_gives_others():
     ("name", "value", "expected"),
     [
         ("host_speed", {"from": 5, "to": 1}, "'to' is below 'from'"),
+        ("host_speed", {"from": -1, "to": 5}, "a speed must not be negative"),
+        ("merging_speed", {"from": 1, "to": float("inf")}, "to = inf"),
         ("count", 0, "count = 0"),
         ("cout", 5, "did you mean 'count'"),
     ],

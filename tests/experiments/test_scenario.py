@@ -2,7 +2,8 @@ import pytest
 
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.encounter_sources import Span
-from merge_cosim.experiments.methods import parse_variation
+from merge_cosim.experiments.methods import Method, parse_variation
+from merge_cosim.experiments.scenario import load_scenario
 
 
 @pytest.mark.parametrize(
@@ -24,3 +25,16 @@ def test_no_value_lies_beyond_the_end(first, last, step, values):
 def test_what_cannot_be_varied_is_refused(text):
     with pytest.raises(UserError, match=r"--vary acc\.d0"):
         parse_variation(text)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"), [("headway", float("inf")), ("k_gap", float("nan")), ("max_acceleration", 0)]
+)
+def test_numbers_with_which_a_host_would_never_arrive_are_refused(parameter, value):
+    with pytest.raises(UserError, match=f"acc: controller acc: {parameter} = "):
+        Method.parse("acc", {f"acc.{parameter}": value})
+
+
+def test_a_horizon_without_end_is_refused():
+    with pytest.raises(UserError, match=r"test\.horizon = inf: Input should be a finite number"):
+        load_scenario("designed-2", {"test.horizon": float("inf")})
