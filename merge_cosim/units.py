@@ -1,12 +1,16 @@
 """Units and the few constants of time and tolerance that every floor shares. SI everywhere inside."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 FOOT = 0.3048
 """Metres per foot; NGSIM's local coordinates, speeds and lengths are in feet."""
+
+HOUR = 3600.0
+"""Seconds per hour."""
 
 DT = 0.1
 """Length of one cycle [s]: NGSIM's frame, SUMO's step and the host's update rate."""
@@ -21,6 +25,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 AnyArray = NDArray[Any]
+
+Share = Annotated[float, Field(ge=0, le=1)]
+"""A parameter that is a share of a whole."""
 
 
 def time_to_arrival(station: FloatArray, speed: FloatArray) -> FloatArray:

@@ -26,7 +26,6 @@ from merge_cosim.experiments.plan import SweepRequest, plan_encounters
 from merge_cosim.experiments.work import Batch, Workplace
 from merge_cosim.files import shipped
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.units import DT
 
 SCENARIO, METHOD = "designed-2", "acc"
 """What is run: the laws of this scenario and method are the ones that the alternatives spell out."""
@@ -122,8 +121,8 @@ def _task(batch: Batch, ramp: Ramp, encounters: Encounters) -> dict[str, Any]:
         "road_length": -ramp.main[0].start,
         "length": float(encounters.host_length[0]),
         "speed_limit": batch.setting(ramp).speed_limit,
-        "horizon": round(rules.horizon / DT),
-        "time_out": round(rules.time_out / DT),
+        "horizon": rules.horizon_cycles,
+        "time_out": rules.time_out_cycles,
         "host_law": asdict(Acc()),
         "merging_law": asdict(car),
         "cases": [dict(zip(states, case, strict=True)) for case in zip(*columns, strict=True)],

@@ -5,6 +5,9 @@ from typing import Annotated
 
 import typer
 
+from merge_cosim.cli.options import Json
+from merge_cosim.cli.show import print_json
+
 app = typer.Typer(help="Import, fetch, look at and imitate NGSIM trajectories.", no_args_is_help=True)
 
 MOST_NAMES = 8
@@ -16,13 +19,11 @@ OptionalSite = Annotated[
     typer.Option("--site", help="Keep only this site (us101, i80); also the site of a file that does not tell it."),
 ]
 Out = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
 
 @app.command("import")
 def import_(files: Files, out: Out, site: OptionalSite = None, as_json: Json = False) -> None:
     """Write NGSIM files of any format as canonical Parquet, one file per site."""
-    import json
     from dataclasses import asdict
 
     from rich.console import Console
@@ -33,7 +34,7 @@ def import_(files: Files, out: Out, site: OptionalSite = None, as_json: Json = F
 
     done = convert(files, out, find_site(site) if site else None)
     if as_json:
-        print(json.dumps(asdict(done), default=str, indent=2))
+        print_json(asdict(done))
         return
     table = Table("site", "recording")
     for name in ("rows", "cars"):
@@ -59,8 +60,6 @@ def download_(
     as_json: Json = False,
 ) -> None:
     """Fetch all NGSIM trajectories (about 1.4 GB) from the US Department of Transportation."""
-    import json
-
     from rich.console import Console
     from rich.progress import BarColumn, DownloadColumn, Progress, TimeRemainingColumn, TransferSpeedColumn
 
@@ -71,7 +70,10 @@ def download_(
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("download", total=None)
         path = download(out, url or PORTAL, lambda done, total: bar.update(task, completed=done, total=total))
-    print(json.dumps({"file": str(path), "bytes": path.stat().st_size}) if as_json else f"wrote {path}")
+    if as_json:
+        print_json({"file": str(path), "bytes": path.stat().st_size})
+    else:
+        print(f"wrote {path}")
 
 
 @app.command("summary")
@@ -80,7 +82,6 @@ def summary(
     as_json: Json = False,
 ) -> None:
     """Show the encounters that a data folder holds, beside the papers' Table I, and what was rejected."""
-    import json
     from math import nan
 
     from rich.console import Console
@@ -90,7 +91,7 @@ def summary(
 
     summaries = summarise_folder(data)
     if as_json:
-        print(json.dumps([each.as_dict() for each in summaries], indent=2))
+        print_json([each.as_dict() for each in summaries])
         return
     table = Table("site", *(Column(name, justify="right") for name in ("pairs", "L_merge", "speed", "yielding")))
     for each in summaries:
@@ -129,8 +130,6 @@ def surrogate(
     as_json: Json = False,
 ) -> None:
     """Write synthetic trajectories, SUMO's own traffic, in NGSIM's format."""
-    import json
-
     import pyarrow.parquet as pq
 
     from merge_cosim.ngsim.sites import SITES
@@ -143,7 +142,7 @@ def surrogate(
         for name, path in files.items()
     ]
     if as_json:
-        print(json.dumps(written, indent=2))
+        print_json(written)
         return
     for each in written:
         print(f"wrote {each['file']}: {each['rows']:,} synthetic rows")

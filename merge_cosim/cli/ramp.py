@@ -5,19 +5,19 @@ from typing import Annotated
 
 import typer
 
+from merge_cosim.cli.options import Json
+from merge_cosim.cli.show import print_json
+
 app = typer.Typer(
     help="List, check, build and edit ramps: folders with ramp.toml and a SUMO net.", no_args_is_help=True
 )
 
 Which = Annotated[str, typer.Argument(metavar="NAME|DIR", help="A shipped ramp's name or a ramp's folder.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
 
 @app.command("list")
 def list_(as_json: Json = False) -> None:
     """Show the shipped ramps."""
-    import json
-
     from rich.console import Console
     from rich.table import Table
 
@@ -25,7 +25,7 @@ def list_(as_json: Json = False) -> None:
 
     ramps = [Ramp.load(name) for name in ramp_names()]
     if as_json:
-        print(json.dumps([ramp.summary() for ramp in ramps], indent=2))
+        print_json([ramp.summary() for ramp in ramps])
         return
     table = Table("ramp", "title", caption="in metres past the gore; limit in m/s")
     for column in ("merge at", "extra lane to", "from", "to", "limit"):
@@ -42,15 +42,13 @@ def list_(as_json: Json = False) -> None:
 @app.command("check")
 def check_(which: Which, as_json: Json = False) -> None:
     """Say what is wrong with a ramp; exit status 1 if anything is."""
-    import json
-
     from merge_cosim.ramps.check import check, notes
     from merge_cosim.ramps.ramp import find_ramp
 
     folder = find_ramp(which)
     problems, remarks = check(folder), notes(folder)
     if as_json:
-        print(json.dumps({"folder": str(folder), "problems": problems, "notes": remarks}, indent=2))
+        print_json({"folder": str(folder), "problems": problems, "notes": remarks})
     else:
         print("\n".join([*(problems or [f"{folder}: no problem found"]), *remarks]))
     if problems:
@@ -60,8 +58,6 @@ def check_(which: Which, as_json: Json = False) -> None:
 @app.command("build")
 def build_(which: Which, as_json: Json = False) -> None:
     """Build a ramp's net from its plain XML sources with netconvert."""
-    import json
-
     from merge_cosim.ramps.build import build
     from merge_cosim.ramps.check import check
     from merge_cosim.ramps.ramp import find_ramp
@@ -70,7 +66,7 @@ def build_(which: Which, as_json: Json = False) -> None:
     net = build(folder)
     problems = check(folder)
     if as_json:
-        print(json.dumps({"net": str(net), "problems": problems}, indent=2))
+        print_json({"net": str(net), "problems": problems})
     else:
         print("\n".join([f"wrote {net}", *problems]))
     if problems:
@@ -151,12 +147,10 @@ def describe(
 
 def _print_found(folder: Path, wrote: str, found: list[str], as_json: bool, *more: str) -> None:
     """Print what a new `ramp.toml` rests on, and what is to be said of the ramp."""
-    import json
-
     from merge_cosim.ramps.check import check, notes
 
     problems, remarks = check(folder), notes(folder)
     if as_json:
-        print(json.dumps({"folder": str(folder), "found": found, "problems": problems, "notes": remarks}, indent=2))
+        print_json({"folder": str(folder), "found": found, "problems": problems, "notes": remarks})
         return
     print("\n".join([wrote, *found, *problems, *remarks, *more]))

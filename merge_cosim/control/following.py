@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from merge_cosim.control.base import Controller
 from merge_cosim.control.law import FollowingLaw
 from merge_cosim.observation import Observation
@@ -17,6 +15,4 @@ class Following(FollowingLaw, Controller):
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """Distance keeping to the target, free driving without one."""
         gap = seen.merging_station - seen.merging_length - seen.host_station
-        free = self.free(seen.host_speed, self.setting.speed_limit)
-        keep = self.follow(gap, seen.host_speed, seen.merging_speed)
-        return self.clip(np.where(target, np.minimum(keep, free), free))
+        return self.drive(target, gap, seen.host_speed, seen.merging_speed, self.setting.speed_limit)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import NonNegativeFloat, NonPositiveFloat, PositiveFloat
 
-from merge_cosim.units import FloatArray
+from merge_cosim.units import BoolArray, FloatArray
 
 
 @dataclass(kw_only=True)
@@ -38,6 +38,13 @@ class FollowingLaw(ABC):
     @abstractmethod
     def follow(self, gap: FloatArray, speed: FloatArray, leader_speed: FloatArray) -> FloatArray:
         """Acceleration [m/s^2] behind a leader, before the bounds; `gap` [m] may be negative."""
+
+    def drive(
+        self, led: BoolArray, gap: FloatArray, speed: FloatArray, leader_speed: FloatArray, speed_limit: float
+    ) -> FloatArray:
+        """Acceleration within the bounds [m/s^2]: free, and where there is a leader (`led`) no more than behind it."""
+        free = self.free(speed, speed_limit)
+        return self.clip(np.where(led, np.minimum(self.follow(gap, speed, leader_speed), free), free))
 
     def clip(self, acceleration: FloatArray) -> FloatArray:
         """Bound the acceleration to what the car can do."""

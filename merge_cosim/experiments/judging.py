@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from merge_cosim.encounter import Encounters, Intention
-from merge_cosim.experiments.statistics.belief import auc, scores
+from merge_cosim.experiments.statistics.belief import auc, filled_bins, scores
 from merge_cosim.intention.base import Estimator, estimators
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.intention.pgm import Pgm
@@ -22,8 +22,8 @@ DISTANCES = ((0.0, 40.0), (40.0, 70.0), (70.0, 110.0), (110.0, np.inf))
 """Bands of the merging car's distance to the merging point [m], by which estimates are judged."""
 SPEED_BAND = 5.0
 """Width of the bands of V_{t-1} [m/s], by which densities are judged."""
-PROBABILITY_EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""Bins of P(NOT_YIELD), by which calibration is judged."""
+PROBABILITY_BINS = 5
+"""Bins of P(NOT_YIELD) by which calibration is judged."""
 JUDGED = (
     *("pgm", "pgm-time", "pgm-speed", "pgm-g", "fg", "fg-time"),
     *("fg-gmm", "fg-gmm-time", "fg-gmm-joint", "slot-time"),
@@ -119,17 +119,9 @@ def calibration(watched: Watched) -> list[dict[str, Any]]:
     """Mean P(NOT_YIELD) and share that did not yield, by bins of the former; none for a rule without doubt."""
     if not np.isfinite(watched.log_odds).all():
         return []
-    p = _probability(watched.log_odds)
-    bins = np.digitize(p, PROBABILITY_EDGES[1:-1])
     return [
-        {
-            "p_from": PROBABILITY_EDGES[i],
-            "p_to": PROBABILITY_EDGES[i + 1],
-            "frames": int((bins == i).sum()),
-            "mean_p": round(float(p[bins == i].mean()), 4),
-            "not_yield_share": round(float(watched.not_yield[bins == i].mean()), 4),
-        }
-        for i in np.unique(bins).tolist()
+        {"p_from": low, "p_to": high, "frames": n, "mean_p": round(mean, 4), "not_yield_share": round(share, 4)}
+        for low, high, n, mean, share in filled_bins(watched.log_odds, watched.not_yield, PROBABILITY_BINS)
     ]
 
 
@@ -174,8 +166,3 @@ def _mean_losses(losses: FloatArray) -> dict[str, Any]:
     means = losses[:, possible].mean(axis=1).round(4).tolist() if possible.any() else [None] * len(DENSITIES)
     ruled_out = int((~possible).sum())
     return {"transitions": len(possible), "ruled_out": ruled_out, **dict(zip(DENSITIES, means, strict=True))}
-
-
-def _probability(log_odds: FloatArray) -> FloatArray:
-    probability: FloatArray = 0.5 + 0.5 * np.tanh(0.5 * log_odds)
-    return probability

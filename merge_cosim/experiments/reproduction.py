@@ -11,6 +11,7 @@ from merge_cosim.experiments.sweep import SweepRequest, sweep
 from merge_cosim.experiments.training import train
 from merge_cosim.ngsim.encounters import site_encounters
 from merge_cosim.ngsim.sites import SITES
+from merge_cosim.ngsim.sites import site as find_site
 
 NODES = (1, 2, 4, 8, 13, 20, 26, 32, 39, 45, 52, 59, 66, 73, 80, 90, 100, 110, 120)
 """Numbers of speed nodes that are tried (Dong, Dolan, Litkouhi 2017, failure rate by number of nodes)."""
@@ -100,5 +101,5 @@ def _sites(data: Path | None) -> dict[SourceChoice, list[str]]:
 
 
 def _has_pairs(name: str, data: Path) -> bool:
-    found = site_encounters(data, next(site for site in SITES if site.name == name))
+    found = site_encounters(data, find_site(name))
     return found is not None and len(found) > 0

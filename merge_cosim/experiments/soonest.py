@@ -42,7 +42,7 @@ class Ahead:
         """Take the log of one encounter; past its end he goes on at his last speed."""
         assert encounters.log is not None
         logged = encounters.log.merging_station[row]
-        cycles, horizon = round(rules.time_out / DT), round(rules.horizon / DT)
+        cycles, horizon = rules.time_out_cycles, rules.horizon_cycles
         beyond = np.arange(1, max(cycles + horizon + 1 - len(logged), 0) + 1)
         station = np.concatenate([logged, logged[-1] + beyond * max(logged[-1] - logged[-2], 0.0)])
         rear = station - float(encounters.merging_length[row])

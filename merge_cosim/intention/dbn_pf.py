@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from merge_cosim.intention.base import Estimator, estimators
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.intention.particles import Cloud, Dice, low_variance
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.streams import Keys
-from merge_cosim.units import TOLERANCE, FloatArray, IntArray
-
-Share = Annotated[float, Field(ge=0, le=1)]
+from merge_cosim.units import TOLERANCE, FloatArray, IntArray, Share
 
 
 class Maneuver(IntEnum):

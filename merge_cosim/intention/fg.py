@@ -15,10 +15,9 @@ from merge_cosim.intention.evidence import LogRatio, SpeedEvidence
 from merge_cosim.intention.histogram import time_bin
 from merge_cosim.intention.mixture import Density
 from merge_cosim.intention.model import IntentionModel
-from merge_cosim.intention.pgm import Share
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.streams import Keys
-from merge_cosim.units import FloatArray, IntArray
+from merge_cosim.units import FloatArray, IntArray, Share
 
 
 @dataclass(kw_only=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
-from pydantic import Field, NonNegativeFloat, PositiveInt
+from pydantic import NonNegativeFloat, PositiveInt
 
 from merge_cosim.intention.base import Estimator, estimators
 from merge_cosim.intention.evidence import LogRatio, SpeedEvidence
@@ -14,9 +14,7 @@ from merge_cosim.intention.histogram import time_bin
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.streams import Keys
-from merge_cosim.units import FloatArray, IntArray
-
-Share = Annotated[float, Field(ge=0, le=1)]
+from merge_cosim.units import FloatArray, IntArray, Share
 
 
 @dataclass(kw_only=True)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from merge_cosim.experiments.methods import HUMAN, ORACLE_BEST
-from merge_cosim.experiments.statistics.summary import ALL_SITES, AMBIGUITY_EDGES
+from merge_cosim.experiments.statistics.summary import ALL_SITES, AMBIGUITY_EDGES, by_start
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order, is_reference
 from merge_cosim.report.published import published
@@ -103,10 +103,9 @@ def strata_table(results: pd.DataFrame, section: Section) -> Table:
     rows = section.of(results)
     rows = rows[~rows["censored"]]
     columns, parts = [METHOD], {}
-    for low, high in pairwise(AMBIGUITY_EDGES):
-        name = f"[{low:g}, {high:g}) s" if np.isfinite(high) else f"≥ {low:g} s"
-        key = f"{low:g}_{high:g}s"
-        parts[key] = rows[(rows["ambiguity_s"] >= low) & (rows["ambiguity_s"] < high)]
+    for (low, high), (start, part) in zip(pairwise(AMBIGUITY_EDGES), by_start(rows), strict=True):
+        key, name = f"{low:g}_{high:g}s", start.replace(">=", "≥")
+        parts[key] = part
         columns += [Column(f"n_{key}", "n", 0, name), Column(f"failure_pct_{key}", "%", 2, name)]
     if rows["extended"].any():
         parts["logged"] = rows[~rows["extended"]]

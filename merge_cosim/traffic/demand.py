@@ -15,9 +15,8 @@ from merge_cosim.ramps.routes import COLORS, ROLE, configuration, element, write
 from merge_cosim.ramps.tiles import tile_id, tile_net
 from merge_cosim.ramps.view import copy_view
 from merge_cosim.traffic.recipe import DRIVERS
+from merge_cosim.units import HOUR
 
-HOUR = 3600.0
-"""Seconds per hour."""
 SUBLANE = 0.8
 """Width of a sublane [m], which the lane-change model SL2015 works with."""
 HOST_LENGTH = 4.7

@@ -39,7 +39,5 @@ class Designed(DistanceKeeping, MergingCar):
             host_ahead = lead > TOLERANCE
             if self.ahead == "in-lane":
                 host_ahead &= np.minimum(now.merging_station, now.host_station) >= -TOLERANCE
-        free = self.free(now.merging_speed, self.setting.speed_limit)
-        keep = self.follow(gap, now.merging_speed, now.host_speed)
-        acceleration = self.clip(np.where(host_ahead, np.minimum(keep, free), free))
+        acceleration = self.drive(host_ahead, gap, now.merging_speed, now.host_speed, self.setting.speed_limit)
         return np.maximum(now.merging_speed + acceleration * self.setting.dt, 0.0)

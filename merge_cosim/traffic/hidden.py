@@ -7,19 +7,17 @@ decisions matter, because he reacts to what the host does.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field, NegativeFloat, NonNegativeFloat, PositiveFloat
+from pydantic import NegativeFloat, NonNegativeFloat, PositiveFloat
 
 from merge_cosim.control.law import DistanceKeeping
 from merge_cosim.encounter import Encounters, Intention
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.streams import normal, stream_keys, uniform
 from merge_cosim.traffic.base import MergingCar, merging_cars
-from merge_cosim.units import TOLERANCE, FloatArray, IntArray
-
-Share = Annotated[float, Field(ge=0, le=1)]
+from merge_cosim.units import TOLERANCE, FloatArray, IntArray, Share
 
 IGNORE = int(Intention.UNKNOWN)
 """A driver who ignores the host has no intention towards him: the order is left to the two arrivals."""
@@ -137,7 +135,7 @@ class Hidden(DistanceKeeping, MergingCar):
         ignores = intention == IGNORE
         passed = np.where(ignores, now.merging_station, np.maximum(now.host_station, now.merging_station)) >= -TOLERANCE
         plan = np.where(ignores, 0.0, self.plan(now, intention))
-        wanted = self.clip(np.where(passed, self._behind_or_free(now), plan))
+        wanted = np.where(passed, self._behind_or_free(now), plan)
         keep = float(np.exp(-dt / self.time_constant))
         fresh = normal(self._keys, age + 1, 1)[:, 0]
         self._noise = keep * self._noise + self.sigma * float(np.sqrt(1.0 - keep**2)) * fresh
@@ -160,6 +158,5 @@ class Hidden(DistanceKeeping, MergingCar):
 
     def _behind_or_free(self, now: Observation) -> FloatArray:
         lead = now.host_station - now.merging_station
-        free = self.free(now.merging_speed, self.setting.speed_limit)
-        keep = self.follow(lead - now.host_length, now.merging_speed, now.host_speed)
-        return np.where(lead > TOLERANCE, np.minimum(keep, free), free)
+        gap, limit = lead - now.host_length, self.setting.speed_limit
+        return self.drive(lead > TOLERANCE, gap, now.merging_speed, now.host_speed, limit)

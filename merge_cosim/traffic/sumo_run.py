@@ -11,12 +11,9 @@ from lxml import etree
 from merge_cosim.errors import UserError
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.traffic.recipe import Recipe
-from merge_cosim.units import DT
+from merge_cosim.units import DT, HOUR
 
 _FILES = {"routes": "rou.xml", "signs": "add.xml", "edges": "txt", "fcd": "parquet"}
-
-HOUR = 3600.0
-"""Seconds per hour."""
 
 RUN_OUT = 150.0
 """Cars leave the net this far beyond the recorded road [m], so that its end does not show."""

@@ -1,5 +1,8 @@
 """Summary rows against counts by hand."""
 
+import re
+from pathlib import Path
+
 import pandas as pd
 import pyarrow as pa
 import pytest
@@ -107,3 +110,10 @@ def test_sites_are_pooled_only_within_one_source():
 def test_a_fixed_grid_has_no_interval():
     row = summarise(frame({"case": "a", "method": "m", "source": "designed"}), {}).iloc[0]
     assert pd.isna(row["ci_low_pct"])
+
+
+def test_every_column_is_defined_on_the_page_of_measures():
+    page = (Path(__file__).parents[2] / "docs" / "measures.md").read_text(encoding="utf-8")
+    summary = summarise(frame({"case": "a", "method": "m"}), {})
+    columns = {re.sub(r"^(log_odds|arrival_lead)_\d+$", r"\1_G", name) for name in (*SCHEMA.names, *summary)}
+    assert columns - set(re.findall(r"`(\w+)`", page)) == set()

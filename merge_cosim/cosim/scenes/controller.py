@@ -130,10 +130,8 @@ class HostController:
             ahead[host.name] = (gap + host.min_gap, vehicle.getSpeed(name)) if name else (math.inf, 0.0)
         speed = np.array([host.speed for host in hosts])
         gap, leader_speed = np.array(list(ahead.values())).reshape(-1, 2).T
-        free = self._law.free(speed, self._setting.speed_limit)
         led = np.isfinite(gap)
-        keep = self._law.follow(np.where(led, gap, 0.0), speed, leader_speed)
-        wanted = self._law.clip(np.where(led, np.minimum(keep, free), free))
+        wanted = self._law.drive(led, np.where(led, gap, 0.0), speed, leader_speed, self._setting.speed_limit)
         return dict(zip(ahead, wanted.tolist(), strict=True)), ahead
 
     def _follower_gap(self, host: str) -> float:

@@ -19,9 +19,8 @@ from merge_cosim.cosim.session import SumoOptions, libsumo_started, one_line, tr
 from merge_cosim.errors import UserError
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.units import HOUR
 
-HOUR = 3600.0
-"""Seconds per hour."""
 _STATISTICS = {
     "vehicles": "stats.vehicles.inserted",
     "waiting": "stats.vehicles.waiting",

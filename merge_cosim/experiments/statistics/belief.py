@@ -42,11 +42,10 @@ def calibration(rows: pd.DataFrame) -> pd.DataFrame:
             continue
         for gate in GATES:
             known = group[np.isfinite(group[f"log_odds_{gate}"].to_numpy(dtype=float))]
-            probability = _probability(known[f"log_odds_{gate}"].to_numpy())
-            truth = (known["label"] == "NOT_YIELD").to_numpy()
-            for low, n, mean, share in _bins(probability, truth):
+            odds, truth = known[f"log_odds_{gate}"].to_numpy(), (known["label"] == "NOT_YIELD").to_numpy()
+            for low, high, n, mean, share in filled_bins(odds, truth):
                 found.append(
-                    key | {"gate_m": gate, "from": low, "to": low + 1 / BINS, "n": n}
+                    key | {"gate_m": gate, "from": low, "to": high, "n": n}
                     | {"mean_belief": round(mean, 6), "not_yield_share": round(share, 6)}
                 )  # fmt: skip
     return pd.DataFrame(found)
@@ -59,6 +58,7 @@ def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
         log_odds: `log P(NOT_YIELD) - log P(YIELD)`, shape (n,), n > 0.
         truth: The label is NOT_YIELD, shape (n,).
     """
+    from scipy.special import expit
     from sklearn.metrics import brier_score_loss
 
     found: dict[str, Any] = {
@@ -69,10 +69,9 @@ def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
     }
     if np.isinf(log_odds).all():
         return found
-    probability = _probability(log_odds)
     surprise = float(np.logaddexp(0.0, np.where(truth, -log_odds, log_odds)).mean())
-    errors = [n * abs(mean - share) for _, n, mean, share in _bins(probability, truth)]
-    found["brier"] = round(float(brier_score_loss(truth, probability)), 6)
+    errors = [n * abs(mean - share) for _, _, n, mean, share in filled_bins(log_odds, truth)]
+    found["brier"] = round(float(brier_score_loss(truth, expit(log_odds))), 6)
     found["log_loss"] = round(surprise, 6) if np.isfinite(surprise) else None
     found["calibration_error"] = round(sum(errors) / len(truth), 6)
     found["auc"] = auc(log_odds, truth)
@@ -86,6 +85,20 @@ def auc(score: FloatArray, truth: BoolArray) -> float | None:
     return round(float(roc_auc_score(truth, np.nan_to_num(score))), 6) if 0 < truth.sum() < len(truth) else None
 
 
+def filled_bins(
+    log_odds: FloatArray, truth: BoolArray, count: int = BINS
+) -> Iterator[tuple[float, float, int, float, float]]:
+    """Both edges, number of cases, mean P(NOT_YIELD) and share of NOT_YIELD of each bin that is not empty."""
+    from scipy.special import expit
+
+    probability = expit(log_odds)
+    bins = np.minimum((probability * count).astype(int), count - 1)
+    for number in np.unique(bins).tolist():
+        here = bins == number
+        edges = number / count, (number + 1) / count
+        yield *edges, int(here.sum()), float(probability[here].mean()), float(truth[here].mean())
+
+
 def _groups(rows: pd.DataFrame) -> Iterator[tuple[dict[str, str], str, pd.DataFrame]]:
     frame = rows[rows["label"] != ""]
     for key, group in with_all_sites(frame).groupby(GROUP, sort=True):
@@ -94,18 +107,3 @@ def _groups(rows: pd.DataFrame) -> Iterator[tuple[dict[str, str], str, pd.DataFr
         if not names["variation"]:
             for start, part in by_start(group):
                 yield names, start, part
-
-
-def _probability(log_odds: FloatArray) -> FloatArray:
-    from scipy.special import expit
-
-    values: FloatArray = expit(log_odds)
-    return values
-
-
-def _bins(probability: FloatArray, truth: BoolArray) -> Iterator[tuple[float, int, float, float]]:
-    """Lower edge, count, mean belief and share of NOT_YIELD of each filled bin."""
-    bins = np.minimum((probability * BINS).astype(int), BINS - 1)
-    for number in np.unique(bins):
-        here = bins == number
-        yield number / BINS, int(here.sum()), float(probability[here].mean()), float(truth[here].mean())
