@@ -2,7 +2,7 @@
 
 import numpy as np
 from cases import random_encounters
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from merge_cosim.control.base import controllers
@@ -19,18 +19,22 @@ def outcome(seed, method):
     encounters = random_encounters(40, seed)
     driver = Driver(estimators[method](), controllers["acc"]())
     run = simulate(NumpyPlant(40), encounters, driver, merging_cars["designed"](), Rules(), Setting())
-    return run.columns, post_encroachment(run.columns, encounters, 0.1)
+    return encounters, run.columns, post_encroachment(run.columns, encounters, 0.1)
 
 
 @settings(max_examples=25)
+@example(108, "always-yield")  # the host stops with its rear 5 cm past the point
 @given(st.integers(0, 10_000), st.sampled_from(["always-go", "always-yield", "slot-time"]))
 def test_failure_gap_time_and_encroachment_agree(seed, method):
-    c, pet = outcome(seed, method)
+    encounters, c, pet = outcome(seed, method)
     failed = c["kind"] > 0
     side = c["kind"] == KINDS.index("side")
     assert (c["min_gap_m"][failed] < -1e-6).all()
     assert (c["min_gap_m"][~failed] >= -1e-6).all()
-    assert not (side & (pet > 0.1)).any()  # who leaves a whole cycle between them does not meet him at the point
+    # who leaves a whole cycle between them meets him at the point only if he has crept less than a step past it
+    rears = np.stack([c["end_station"] - encounters.host_length, c["end_merging_station"] - encounters.merging_length])
+    step = 0.1 * np.stack([c["end_merging_speed"], c["end_speed"]])
+    assert (((rears > 0) & (rears < step)).any(axis=0) | ~(side & (pet > 0.1))).all()
     assert failed[pet < -0.1].all()  # who arrives a whole cycle too early does
     assert (c["min_ttc_s"] >= 0).all()
     assert ((c["max_drac"] > 0) <= np.isfinite(c["min_ttc_s"])).all()
@@ -41,7 +45,7 @@ def test_failure_gap_time_and_encroachment_agree(seed, method):
 @settings(max_examples=10)
 @given(st.integers(0, 10_000))
 def test_times_are_in_order(seed):
-    c, _ = outcome(seed, "slot-time")
+    _, c, _ = outcome(seed, "slot-time")
     for front, rear in (("host_reached_s", "host_cleared_s"), ("merging_reached_s", "merging_cleared_s")):
         both = ~np.isnan(c[front]) & ~np.isnan(c[rear])
         assert (c[rear][both] > c[front][both]).all()
