@@ -45,5 +45,6 @@ def test_nets_and_scenarios_are_found_from_a_wheel(tmp_path):
         env=os.environ | {"PYTHONPATH": str(site)},
         capture_output=True,
         text=True,
+        check=True,
     )
-    assert all(Path(path).is_relative_to(site) for path in done.stdout.split())
+    assert [Path(path).is_relative_to(site) for path in done.stdout.split()] == [True] * 3

@@ -11,7 +11,7 @@ def command(host, merging, target=True, **gains):
     controller = Acc(**gains)
     controller.start(1, Setting(speed_limit=29.0))
     one = np.array
-    seen = Observation(one([host[0]]), one([host[1]]), one([merging[0]]), one([merging[1]]), one([5.0]), one([5.0]))
+    seen = Observation(one([host[0]]), one([host[1]]), one([merging[0]]), one([merging[1]]), one([9.0]), one([5.0]))
     return controller.command(seen, np.zeros(1), np.array([target]))[0]
 
 

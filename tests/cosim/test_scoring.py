@@ -24,12 +24,15 @@ DEFAULTS = Rules()
 
 
 def laid(host, merging, length=5.0, odds=None, speeds=None):
-    """One encounter from lists of stations, its speeds (the way of each cycle, unless given) and its beliefs."""
+    """One encounter from lists of stations, its speeds (the way of each cycle, unless given) and its beliefs.
+
+    `length` is that of both cars, or of host and merging car.
+    """
     host, merging = np.array(host, dtype=float), np.array(merging, dtype=float)
     ways = [np.concatenate([np.diff(station)[:1], np.diff(station)]) / 0.1 for station in (host, merging)]
     host_speed, merging_speed = (np.full(len(host), speed) for speed in speeds) if speeds else ways
-    lengths = np.full(len(host), length)
-    states = Observation(host, host_speed, merging, merging_speed, lengths, lengths)
+    lengths = (np.full(len(host), float(one)) for one in np.broadcast_to(length, 2))
+    states = Observation(host, host_speed, merging, merging_speed, *lengths)
     odds = np.zeros(len(host)) if odds is None else np.array(odds, dtype=float)
     return Tracks(states, odds, np.array([0]), np.array([len(host) - 1]))
 
@@ -63,6 +66,8 @@ def test_apart_by_a_car_length_exactly_is_no_overlap():
     assert columns["kind"][0] == 0
     assert columns["min_gap_m"][0] == pytest.approx(0.0, abs=1e-9)
     assert over == 10 + 30  # both past 0 at cycle 10, then the horizon of 3 s
+    assert columns["scored_to_end"][0]
+    assert not run(line(-5, 10, 40), line(-10, 10, 40))[0]["scored_to_end"][0]  # a cycle is missing
 
 
 def test_side_overlap_fails_at_the_first_cycle_with_both_past():
@@ -98,6 +103,11 @@ def test_distance_is_interpolated_at_the_hosts_crossing():
     assert columns["host_reached_s"][0] == pytest.approx(0.225)
     assert columns["distance_m"][0] == pytest.approx(20 + 0.225 * 8)
     assert columns["gap_m"][0] == pytest.approx(20 + 0.225 * 8 - 5)
+
+
+def test_the_gap_at_the_hosts_crossing_leaves_out_the_leaders_length():
+    assert run(line(-2.25, 10), line(20, 8), length=(4, 7))[0]["gap_m"][0] == pytest.approx(20 + 0.225 * 8 - 7)
+    assert run(line(-2.25, 10), line(-20, 8), length=(4, 7))[0]["gap_m"][0] == pytest.approx(20 - 0.225 * 8 - 4)
 
 
 def test_time_to_collision_is_gap_over_closing_speed():
@@ -137,6 +147,8 @@ def test_deceleration_to_avoid_a_crash_is_half_the_squared_closing_speed_over_th
     touching, _ = run(line(0.0, 10, 12), line(5.2, 8, 12))  # gap 0.2 m at first, none after one cycle
     assert touching["kind"][0] == HOST_INTO_MERGING
     assert touching["max_drac"][0] == 0.0
+    close, _ = run(line(0.0, 10, 12), line(5.5, 9, 12))  # gap 0.1 m after four cycles, the last one before they touch
+    assert close["max_drac"][0] == pytest.approx(1.0 / (2 * 0.1))
 
 
 def test_bumpers_pass_the_merging_point_at_interpolated_times():
@@ -156,6 +168,9 @@ def test_jerk_is_summed_from_the_second_cycle_on():
     # speeds 20, 19, 19, 18 m/s in cycles 1 to 4: decelerations 0 (start at 20), 10, 0, 10 m/s^2
     columns, _ = run([-50.0, -48.0, -46.1, -44.2, -42.4], line(-80, 5, 5))
     assert columns["jerk_sum"][0] == pytest.approx(10 + 10 + 10)  # in m/s^2 per cycle
+    tracks = laid(line(-50, 20, 5), line(-80, 5, 5))
+    tracks.states.host_speed[:] = [20.0, 18.0, 18.0, 17.0, 17.0]  # 20, 0, 10, 0 m/s^2: what came before is not known
+    assert score(tracks, Rules())["jerk_sum"][0] == pytest.approx(20 + 10 + 10)
 
 
 def test_a_decision_stands_from_its_last_change_on():
@@ -227,6 +242,9 @@ def test_the_recorder_gives_back_what_went_through_it():
     recorder, encounters = Recorder(3, longest=4), random_encounters(5, seed=7)
     recorder.placed(np.arange(3), encounters.start[:, :3])
     history = [encounters.start[:4, :3].round(6)]
+    assert (history[0] != encounters.start[:4, :3]).any()
+    np.testing.assert_array_equal(recorder.seen.host_station, history[0][0])
+    np.testing.assert_array_equal(recorder.seen.merging_speed, history[0][3])
     for cycle in range(1, 8):  # more cycles than it holds
         recorder.believed(np.full(3, cycle - 1.0))
         history.append((history[-1] + 1.0).round(6))
