@@ -141,6 +141,23 @@ class Encounters:
     length_missing: BoolArray
     log: ReplayLog | None = None
 
+    @classmethod
+    def unlogged(cls, case: AnyArray, site: str, source: str, **given: FloatArray | float) -> Encounters:
+        """Encounters with neither log nor label, merging at the gore unless `merge_position` is given.
+
+        Args:
+            case: Their names, shape (n,).
+            site: Of all of them.
+            source: Of all of them.
+            **given: The initial states and lengths, and whatever else differs; a number stands for all and takes no
+                room.
+        """
+        usual = {"merge_position": 0.0, "label": int(Intention.UNKNOWN)}
+        flags = {"smoothed_source": False, "length_missing": False}
+        texts = {"site": site, "source": source, "car": ""}
+        every: dict[str, FloatArray | float | str] = {**texts, **usual, **flags, **given}
+        return cls(case, **{name: np.broadcast_to(value, len(case)) for name, value in every.items()}, log=None)
+
     def __len__(self) -> int:
         return len(self.case)
 

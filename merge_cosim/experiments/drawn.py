@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from merge_cosim.encounter import Encounters, Intention
+from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.encounter_sources import Drawn
 from merge_cosim.streams import stream_keys, uniform
@@ -38,19 +38,14 @@ def drawn_encounters(drawn: Drawn) -> Encounters:
     else:
         raise UserError("encounters: no host within these ways and speeds arrives max_lead before or after its rival")
     host_speed = low + fixed[:, 1] * (high - low)
-    return Encounters(
-        case=case,
-        site=np.full(n, "designed"),
-        source=np.full(n, "random"),
-        car=np.full(n, ""),
+    return Encounters.unlogged(
+        case,
+        "designed",
+        "random",
         host_station=-host_speed * (way / speed - lead),
         host_speed=host_speed,
-        host_length=np.full(n, drawn.length),
+        host_length=drawn.length,
         merging_station=-way,
         merging_speed=speed,
-        merging_length=np.full(n, drawn.length),
-        merge_position=np.zeros(n),
-        label=np.full(n, int(Intention.UNKNOWN)),
-        smoothed_source=np.zeros(n, dtype=bool),
-        length_missing=np.zeros(n, dtype=bool),
+        merging_length=drawn.length,
     )

@@ -125,21 +125,15 @@ def _designed(
     host_speed: FloatArray,
     merging_speed: FloatArray,
 ) -> Encounters:
-    """Encounters without a log; what is the same for all of them takes no room."""
-    n = len(cases)
-    return Encounters(
-        case=np.array(cases),
-        site=np.broadcast_to("designed", n),
-        source=np.broadcast_to(source, n),
-        car=np.broadcast_to("", n),
+    """Encounters from initial states."""
+    return Encounters.unlogged(
+        np.array(cases),
+        "designed",
+        source,
         host_station=states.merging_station + offset,
         host_speed=host_speed,
-        host_length=np.broadcast_to(states.length, n),
-        merging_station=np.broadcast_to(states.merging_station, n),
+        host_length=states.length,
+        merging_station=states.merging_station,
         merging_speed=merging_speed,
-        merging_length=np.broadcast_to(states.length, n),
-        merge_position=np.broadcast_to(0.0, n),
-        label=np.broadcast_to(int(Intention.UNKNOWN), n),
-        smoothed_source=np.broadcast_to(False, n),
-        length_missing=np.broadcast_to(False, n),
+        merging_length=states.length,
     )

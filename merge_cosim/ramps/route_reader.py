@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from merge_cosim.encounter import Encounters, Intention
+from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
 from merge_cosim.ramps.configuration import Configuration, parse
 from merge_cosim.ramps.ramp import Ramp
@@ -61,16 +61,13 @@ def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
             f"{file}: {len(hosts)} cars with the role host and {len(merging)} with the role merging; each encounter "
             f'needs one of both (<param key="{ROLE}" value="host"/> in the vType)'
         )
-    n = len(hosts)
     merge_position = np.array(
         [ramp.merging_point if car.merge_position is None else car.merge_position for car in merging]
     )
-    nothing = np.zeros(n, dtype=bool)
-    return ramp, Encounters(
-        case=np.array([f"{host.name}_{car.name}" for host, car in zip(hosts, merging, strict=True)]),
-        site=np.full(n, ramp.name),
-        source=np.full(n, "designed"),
-        car=np.full(n, ""),
+    return ramp, Encounters.unlogged(
+        np.array([f"{host.name}_{car.name}" for host, car in zip(hosts, merging, strict=True)]),
+        ramp.name,
+        "designed",
         host_station=_stations(ramp, hosts, merge_position, routes[0]),
         host_speed=np.array([car.speed for car in hosts]),
         host_length=np.array([car.length for car in hosts]),
@@ -78,9 +75,6 @@ def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
         merging_speed=np.array([car.speed for car in merging]),
         merging_length=np.array([car.length for car in merging]),
         merge_position=merge_position,
-        label=np.full(n, int(Intention.UNKNOWN)),
-        smoothed_source=nothing,
-        length_missing=nothing,
     )
 
 

@@ -100,6 +100,30 @@ def test_a_case_alone_ends_as_in_its_batch_and_can_be_traced():
     )
 
 
+@pytest.mark.parametrize(
+    ("method", "start", "before", "after"),
+    [
+        ("always-go", (-60.0, 20.0, -2.0, 5.0), 2.0, -4.0),  # free until a slow car is in the lane ahead
+        ("always-yield", (-1.0, 10.0, -8.0, 10.0), -4.0, 2.0),  # keeps behind, until the other is behind for good
+    ],
+)
+def test_a_car_in_the_lane_is_followed_iff_it_is_ahead_whatever_is_believed(method, start, before, after):
+    case = Encounters.unlogged(
+        np.array(["c"]),
+        "designed",
+        "designed",
+        **dict(zip(("host_station", "host_speed", "merging_station", "merging_speed"), start, strict=True)),
+        host_length=5.0,
+        merging_length=5.0,
+    )
+    trace = run(NumpyPlant(1), case, method, traced=(0,)).traces[0]
+    in_lane = np.array(trace["merging_station_m"]) >= 0
+    first = int(np.argmax(in_lane))
+    assert 0 < first < 20
+    np.testing.assert_allclose(trace["host_acceleration_m_s2"][:first], before, atol=1e-4)
+    assert trace["host_acceleration_m_s2"][first] == pytest.approx(after, abs=1e-4)
+
+
 def test_sumo_reports_the_overlaps_of_the_designed_ramp():
     encounters = random_encounters(300, seed=5)
     result = on_sumo("designed", 64, encounters, "always-go")

@@ -174,4 +174,6 @@ def test_cars_with_several_cases_get_a_clustered_interval():
     assert row["cluster_high_pct"] - row["cluster_low_pct"] > row["ci_high_pct"] - row["ci_low_pct"] - 5
     single = summarise(frame(*(one | {"car": one["case"]} for one in rows)), {}).iloc[0]
     assert pd.isna(single["cluster_low_pct"])
+    half = [one | {"failed": i % 2 == 0, "censored": i % 2 == 1} for i, one in enumerate(rows)]
+    assert summarise(frame(*half), {}).iloc[0]["cluster_low_pct"] == 100.0  # what is censored does not count
     assert single["distance_low_m"] == single["distance_high_m"] == 10.0

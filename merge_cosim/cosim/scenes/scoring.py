@@ -11,7 +11,7 @@ from merge_cosim.cosim.scenes.meetings import RECORDED, Ending, Meeting
 from merge_cosim.cosim.scoring import HOST_INTO_LEADER, Rules, ends
 from merge_cosim.cosim.scoring import score as score_tracks
 from merge_cosim.cosim.tracks import Tracks
-from merge_cosim.encounter import Encounters, Intention
+from merge_cosim.encounter import Encounters
 from merge_cosim.units import TOLERANCE, FloatArray
 
 LEAST_STATES = 2
@@ -33,15 +33,12 @@ def encounters_of(meetings: Sequence[Meeting], scene: str, site: str, source: st
         site: Name of the ramp.
         source: Where the cars come from.
     """
-    n = len(meetings)
-    first = np.array([meeting.states[0][:4] for meeting in meetings]).reshape(n, 4)
+    first = np.array([meeting.states[0][:4] for meeting in meetings]).reshape(-1, 4)
     merge_position = np.array([meeting.merge_position for meeting in meetings])
-    nothing = np.zeros(n, dtype=bool)
-    return Encounters(
-        case=np.array([f"{scene}/{meeting.host.name}/{meeting.merging.name}" for meeting in meetings], dtype=str),
-        site=np.full(n, site),
-        source=np.full(n, source),
-        car=np.full(n, ""),
+    return Encounters.unlogged(
+        np.array([f"{scene}/{meeting.host.name}/{meeting.merging.name}" for meeting in meetings], dtype=str),
+        site,
+        source,
         host_station=first[:, 0] - merge_position,
         host_speed=first[:, 1],
         host_length=np.array([meeting.host.length for meeting in meetings]),
@@ -49,9 +46,6 @@ def encounters_of(meetings: Sequence[Meeting], scene: str, site: str, source: st
         merging_speed=first[:, 3],
         merging_length=np.array([meeting.merging.length for meeting in meetings]),
         merge_position=merge_position,
-        label=np.full(n, int(Intention.UNKNOWN)),
-        smoothed_source=nothing,
-        length_missing=nothing,
     )
 
 
