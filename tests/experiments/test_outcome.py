@@ -13,7 +13,7 @@ from merge_cosim.observation import Setting
 SETTING = Setting(speed_limit=29.0)
 
 
-def encounters(label=1, score_until=60, logged=50):
+def encounters(label=1, score_until=60, logged=50, **states):
     one = np.array
     track = Ragged.of([np.linspace(-50, 0, logged)])
     log = ReplayLog(track, track, track, one([logged - 1]), one([score_until]))
@@ -28,6 +28,7 @@ def encounters(label=1, score_until=60, logged=50):
             "merging_speed": 10.0,
             "merging_length": 5.0,
             "merge_position": 0.0,
+            **states,
         }.items()
     }
     flags = {"smoothed_source": one([False]), "length_missing": one([False])}
@@ -102,6 +103,7 @@ def test_order_and_label():
     assert nobody["host_first"] is None
     assert nobody["host_reached"] is False
     assert row(host_reached_s=np.nan)["host_first"] is False
+    assert row(case=encounters(host_station=1.0), host_reached_s=np.nan)["host_reached"] is True
     unlabelled = row(case=encounters(label=-1))
     assert (unlabelled["label"], unlabelled["correct_at_merge"], unlabelled["order_swapped"]) == ("", None, None)
 
@@ -128,6 +130,7 @@ def test_a_run_past_the_logs_end_is_extended():
 def test_missing_is_missing():
     nothing = row(distance_m=np.nan, gap_m=np.nan)
     assert [nothing[name] for name in ("distance_m", "gap_m", "min_gap_m", "min_ttc_s")] == [None] * 4
+    assert [row(max_drac=drac)["max_drac"] for drac in (0.0, 2.0)] == [None, 2.0]
 
 
 def test_post_encroachment_time_runs_from_the_first_rear_to_the_second_front():
@@ -140,6 +143,13 @@ def test_post_encroachment_time_runs_from_the_first_rear_to_the_second_front():
     standing = row(merging_cleared_s=np.nan, end_merging_station=3.0, end_merging_speed=0.0)
     assert standing["pet_s"] is None
     assert row(host_reached_s=np.nan)["pet_s"] is None
+    on_its_way = row(case=encounters(host_station=1.0), host_reached_s=np.nan, host_cleared_s=0.2)
+    assert on_its_way["pet_s"] == pytest.approx(1.0 - 0.2)  # its rear was still to come
+
+
+def test_ambiguity_is_the_difference_of_the_times_to_arrival():
+    assert row()["ambiguity_s"] == pytest.approx(40 / 10 - 50 / 29)
+    assert row(case=encounters(merging_station=3.0))["ambiguity_s"] == pytest.approx(50 / 29)
 
 
 def test_jerk_and_likeness_are_means_over_the_cycles():

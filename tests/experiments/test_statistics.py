@@ -45,14 +45,15 @@ def test_discordant_cases_are_those_that_both_carry_to_the_end():
         for method, failed in failing.items()
         for case in "abcdefgh"
     ]
-    rows[0] |= {"failed": False, "censored": True}  # case a under 'this'
+    rows[3] |= {"censored": True}  # case d under 'this'
+    rows[9] |= {"censored": True}  # case b under 'other'
     summary = summarise(frame(*rows), {}, against="other").set_index("method")
     row = summary.loc["this"]
-    assert (row["only_this_fails"], row["only_other_fails"]) == (1, 2)  # b; d and e
+    assert (row["only_this_fails"], row["only_other_fails"]) == (1, 1)  # a; e
     assert row["mcnemar_p"] == pytest.approx(1.0)
     assert pd.isna(summary.loc["other", "only_this_fails"])
     grid = summarise(frame(*(row | {"source": "designed"} for row in rows)), {}, against="other").set_index("method")
-    assert grid.loc["this", "only_other_fails"] == 2
+    assert grid.loc["this", "only_other_fails"] == 1
     assert pd.isna(grid.loc["this", "mcnemar_p"])
 
 
@@ -116,6 +117,13 @@ def test_a_rule_has_an_accuracy_alone():
     found = scores(np.array([np.inf, -np.inf, np.inf]), np.array([True, True, True]))
     assert found["accuracy_pct"] == pytest.approx(66.6667)
     assert [found[name] for name in ("auc", "brier", "log_loss", "calibration_error")] == [None] * 4
+
+
+def test_some_certainty_leaves_an_order():
+    found = scores(np.array([np.inf, 1.0, -np.inf, -2.0]), np.array([True, False, False, True]))
+    assert found["auc"] == 0.75
+    assert found["log_loss"] == pytest.approx(np.mean([0, np.log1p(np.e), 0, np.log1p(np.e**2)]), abs=1e-6)
+    assert scores(np.array([np.inf, 1.0]), np.array([False, True]))["log_loss"] is None  # certain, and wrong
 
 
 def labelled(n=200, seed=0):

@@ -100,6 +100,21 @@ def test_unnecessary_yields_need_a_safe_first_passage_of_always_go():
     assert pd.isna(alone["unnecessary_yields"])
 
 
+def test_living_traffic_has_no_case_in_common():
+    methods = ("always-go", "always-yield", "m")
+    rows = frame(
+        *(
+            {"case": "000/h.0/m.0", "method": name, "source": "traffic", "host_first": name == "always-go"}
+            for name in methods
+        )
+    )
+    assert not len(oracle_best(pa.Table.from_pandas(rows, schema=SCHEMA, preserve_index=False)))
+    summary = summarise(rows, {}, against="always-go").set_index("method")
+    assert summary[["unnecessary_yields", "only_this_fails", "mcnemar_p"]].isna().all().all()
+    logged = summarise(rows.assign(source="ngsim"), {}, against="always-go").set_index("method")
+    assert (logged.loc["m", "unnecessary_yields"], logged.loc["m", "only_this_fails"]) == (1, 0)
+
+
 def test_sites_are_pooled_only_within_one_source():
     one = frame({"case": "a", "method": "m"}, {"case": "b", "method": "m", "site": "i80"})
     assert summarise(one, {})["site"].tolist() == ["all", "i80", "us101"]
