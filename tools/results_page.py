@@ -17,7 +17,7 @@ PAGE = Path(__file__).parent.parent / "docs" / "results.md"
 def shown(folder: Path, argument: str) -> str:
     """A table of the folder, or some of its columns, as a Markdown table; rates with two decimals."""
     name, _, columns = argument.partition(" ")
-    rows = pd.read_csv(folder / "tables" / f"{name}.csv")
+    rows = pd.read_csv(folder / "tables" / f"{name}.csv").convert_dtypes()  # counts stay whole beside missing ones
     rows = rows[columns.split(",")] if columns else rows
     cells = [
         ["–" if pd.isna(v) else f"{v:.2f}" if isinstance(v, float) else str(v) for v in values]

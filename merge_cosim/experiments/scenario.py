@@ -181,7 +181,7 @@ _KNOWN: dict[tuple[str, ...], type] = {
 }
 
 
-_KINDS = "grid, random, drawn, pairs, routes, traffic"
+_KINDS = ("grid", "random", "drawn", "pairs", "routes", "traffic")
 
 
 def _first_problem(error: ValidationError) -> str:
@@ -189,8 +189,8 @@ def _first_problem(error: ValidationError) -> str:
     if not first["loc"]:
         return str(first["msg"]).removeprefix("Value error, ")  # of the scenario as a whole
     *place, key = first["loc"]
-    kinds = ("grid", "random", "drawn", "pairs", "routes", "traffic", "[key]")
-    shown = ".".join(str(part) for part in first["loc"] if part not in kinds)
+    shown = ".".join(str(part) for part in first["loc"] if part not in (*_KINDS, "[key]"))
+    kinds = f"(choose from: {', '.join(_KINDS)})"
     if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         section = _KNOWN.get(tuple(str(part) for part in place), Span)
         if issubclass(section, BaseModel):
@@ -201,7 +201,7 @@ def _first_problem(error: ValidationError) -> str:
     if first["type"] == "missing":
         return f"the key '{shown}' is missing"
     if first["type"] == "union_tag_not_found":
-        return f"the key '{shown}.kind' is missing (choose from: {_KINDS})"
+        return f"the key '{shown}.kind' is missing {kinds}"
     if first["type"] == "union_tag_invalid":
-        return f"{shown}.kind = {first['input']['kind']!r}: there is no such kind (choose from: {_KINDS})"
+        return f"{shown}.kind = {first['input']['kind']!r}: there is no such kind {kinds}"
     return f"{shown} = {first['input']!r}: {first['msg'].removeprefix('Value error, ')}"
