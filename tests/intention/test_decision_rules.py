@@ -34,6 +34,7 @@ def test_acc_goes_by_station(host, merging, expected):
         ((-100.0, 10.0), (-50.0, 10.0), "N"),  # arrives 5 s later: would stand 50 m upstream, the slot behind is free
         ((-50.0, 10.0), (-100.0, 10.0), "Y"),  # arrives 5 s sooner: 50 m past, the slot ahead is free
         ((-100.0, 10.0), (-100.0, 10.0), "N"),  # a tie: ahead and behind need the same 2 * 7 / 10^2
+        ((-100.0 + 5e-7, 10.0), (-100.0, 10.0), "N"),  # still a tie
         ((-99.0, 10.0), (-100.0, 10.0), "Y"),  # a metre ahead: 2 * 6 / 10^2 against 2 * 8 / 10^2
         ((-101.0, 10.0), (-100.0, 10.0), "N"),
         ((-10.0, 10.0), (-10.5, 10.0), "N"),  # 1.05 s left: ahead needs 11.8 > 2 m/s^2, none is feasible

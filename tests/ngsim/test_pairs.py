@@ -73,6 +73,8 @@ def test_hosts_stand_at_most_60_m_away(distance: float, accepted: bool) -> None:
 def test_side_by_side_is_yielding() -> None:
     e = pairs(steady(1, MERGE, at=0), steady(2, [5] * 90, at=0)).encounters
     assert e.label.tolist() == [Intention.YIELD]
+    level = pairs(steady(1, MERGE, at=0), steady(2, [5] * 90, at=0), steady(3, [5] * 90, at=-9)).encounters
+    assert level.label.tolist() == [Intention.NOT_YIELD, Intention.YIELD]  # a level car is the one ahead
 
 
 def test_the_window_starts_when_both_are_logged() -> None:

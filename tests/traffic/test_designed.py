@@ -25,6 +25,7 @@ def test_nobody_ahead_means_free_driving(ahead):
 
 def test_clear_needs_a_whole_car_length():
     assert next_speed("clear", (-45.0, 10.0), (-50.0, 10.0)) == pytest.approx(FREE)  # bumper to bumper: a tie, not past
+    assert next_speed("clear", (-45.0 + 5e-7, 10.0), (-50.0, 10.0)) == pytest.approx(FREE)  # within the tolerance
     # gap 1: 0.23 (1 - (2 + 1.0 * 10)) = -2.53
     assert next_speed("clear", (-44.0, 10.0), (-50.0, 10.0)) == pytest.approx(10.0 - 0.253)
 
