@@ -60,8 +60,8 @@ class SpeedMixture:
         weights, means, covariances = [], [], []
         for intention in (Intention.YIELD, Intention.NOT_YIELD):
             speeds = np.column_stack([before, now])[label == intention]
-            if len(speeds) < COMPONENTS:
-                raise UserError(f"{len(speeds)} speed transitions of {intention.name}; a mixture needs more")
+            if (different := len(np.unique(speeds, axis=0))) < COMPONENTS:
+                raise UserError(f"{different} different speed transitions of {intention.name}; a mixture needs more")
             fitted = GaussianMixture(COMPONENTS, covariance_type="full", random_state=RANDOM_STATE).fit(speeds)
             order = np.argsort(fitted.means_[:, 0], kind="stable")
             weights.append(fitted.weights_[order])

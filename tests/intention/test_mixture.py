@@ -81,7 +81,7 @@ def test_fit_finds_the_components_slowest_first():
 
 
 def test_one_transition_is_too_few():
-    with pytest.raises(UserError, match="1 speed transitions of NOT_YIELD"):
+    with pytest.raises(UserError, match="1 different speed transitions of NOT_YIELD"):
         SpeedMixture.fit(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 3.0]), np.array([0, 0, 1]))
 
 
