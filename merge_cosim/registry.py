@@ -9,7 +9,7 @@ import pkgutil
 import re
 import sys
 from abc import ABC
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from difflib import get_close_matches
 from importlib.metadata import entry_points
@@ -50,10 +50,9 @@ class Registry(Generic[C]):
     def register(self, cls: type[C]) -> type[C]:
         """Class decorator: enter `cls` under its `name`; a name that is taken is refused."""
         known = self._classes.get(cls.name)
-        if known is not None and known.__module__ != cls.__module__:
-            raise UserError(
-                f"{cls.__module__}: the {self.role} name '{cls.name}' is taken by {known.__module__}; rename yours"
-            )
+        if known is not None and _full_name(known) != _full_name(cls):  # else its file was imported anew
+            taken = f"the {self.role} name '{cls.name}' is taken by {_full_name(known)}"
+            raise UserError(f"{_full_name(cls)}: {taken}; rename yours")
         self._classes[cls.name] = cls
         return cls
 
@@ -87,6 +86,10 @@ class Registry(Generic[C]):
             entry.load()
 
 
+def _full_name(cls: type) -> str:
+    return f"{cls.__module__}.{cls.__qualname__}"
+
+
 def did_you_mean(name: str, choices: Mapping[str, Any] | list[str]) -> str:
     """The tail of a message about an unknown name: the nearest choice, and all of them."""
     near = get_close_matches(name, list(choices), n=1)
@@ -110,9 +113,8 @@ def meanings(cls: type) -> dict[str, str]:
     return {name: found.get(name, "") for name in parameters(cls)}
 
 
-def validated(cls: Callable[..., C], values: Mapping[str, Any], where: str) -> C:
+def validated(cls: type[C], values: Mapping[str, Any], where: str) -> C:
     """Make the dataclass `cls`, with its fields converted and checked by their type hints."""
-    assert isinstance(cls, type)
     for key in values:
         if key not in parameters(cls):
             raise UserError(f"{where}: no parameter '{key}'{did_you_mean(key, parameters(cls))}")

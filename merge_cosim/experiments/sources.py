@@ -108,13 +108,13 @@ def _grid(grid: Grid) -> Encounters:
     return _designed(grid, "designed", cases, offset, host_speed, merging_speed)
 
 
-def _random(drawn: Random) -> Encounters:
-    spans = (drawn.host_offset, drawn.host_speed, drawn.merging_speed)
+def _random(states: Random) -> Encounters:
+    spans = (states.host_offset, states.host_speed, states.merging_speed)
     low, width = np.array([(span.first, span.last - span.first) for span in spans]).T
-    shares = np.random.default_rng(drawn.seed).random((drawn.count, 3))  # row by row, so that fewer are the first ones
+    shares = np.random.default_rng(states.seed).random((states.count, 3))  # by rows: fewer are the first ones
     offset, host_speed, merging_speed = (low + width * shares).T.copy()
-    cases = [f"r{number:07d}" for number in range(drawn.count)]
-    return _designed(drawn, "random", cases, offset, host_speed, merging_speed)
+    cases = [f"r{number:07d}" for number in range(states.count)]
+    return _designed(states, "random", cases, offset, host_speed, merging_speed)
 
 
 def _designed(
