@@ -52,7 +52,8 @@ def test_speeds_are_those_that_sumo_reports(ramp, merge_position):
     import libsumo
 
     encounters = random_encounters(16, seed=6, merge_position=merge_position)
-    plant = SumoPlant(Ramp.load(ramp), 16)
+    road = Ramp.load(ramp)
+    plant = SumoPlant(road, 16)
     rng = np.random.default_rng(6)
     try:
         for _ in range(2):  # the second time the cars come from where the first encounters ended
@@ -62,6 +63,14 @@ def test_speeds_are_those_that_sumo_reports(ramp, merge_position):
                 for role, speeds in zip(("host", "merging"), plant.state[2:], strict=True):
                     reported = [libsumo.vehicle.getSpeed(f"t{tile}.{role}") for tile in range(16)]
                     np.testing.assert_allclose(speeds, reported, atol=1e-9)
+                if road.changes_lane:  # in the very cycle in which the front is there
+                    lanes = [libsumo.vehicle.getLaneID(f"t{tile}.merging") for tile in range(16)]
+                    edges = [lane.partition(".")[2].rpartition("_")[0] for lane in lanes]
+                    in_host_lane = [
+                        edge in road.main_route and lane.endswith(f"_{road.host_lane_on(edge)}")
+                        for lane, edge in zip(lanes, edges, strict=True)
+                    ]
+                    np.testing.assert_array_equal(in_host_lane, plant.state[1] >= -1e-6)
     finally:
         plant.close()
 

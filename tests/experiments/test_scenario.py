@@ -1,9 +1,11 @@
 import pytest
 
+from merge_cosim.control.acc import Acc
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.encounter_sources import Span
 from merge_cosim.experiments.methods import Method, parse_variation
 from merge_cosim.experiments.scenario import load_scenario
+from merge_cosim.experiments.work import free_law
 
 
 @pytest.mark.parametrize(
@@ -33,6 +35,11 @@ def test_what_cannot_be_varied_is_refused(text):
 def test_numbers_with_which_a_host_would_never_arrive_are_refused(parameter, value):
     with pytest.raises(UserError, match=f"acc: controller acc: {parameter} = "):
         Method.parse("acc", {f"acc.{parameter}": value})
+
+
+def test_delays_are_measured_against_what_is_set_of_acc_whatever_drives():
+    law = free_law(Method.parse("pgm+lqr", {"acc.k_free": 0.2, "pgm.nodes": 3, "lqr.k_free": 0.3}))
+    assert law == Acc(k_free=0.2)
 
 
 def test_a_horizon_without_end_is_refused():
