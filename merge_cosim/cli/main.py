@@ -118,7 +118,7 @@ def run(
     seed: Seed = 0,
     plugin: Plugins = None,
     gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui.")] = False,
-    delay: Annotated[int, typer.Option(help="With --gui: milliseconds per step.")] = 100,
+    delay: Annotated[int, typer.Option(min=0, help="With --gui: milliseconds per step; 100 is real time.")] = 100,
     trace: Annotated[Path | None, typer.Option(help="Write every cycle to this file (.csv or .parquet).")] = None,
     fcd: Annotated[Path | None, typer.Option(help="SUMO's floating car data (.xml).")] = None,
     ssm: Annotated[Path | None, typer.Option(help="SUMO's conflicts, braking and gaps.")] = None,

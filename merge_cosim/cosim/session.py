@@ -208,6 +208,11 @@ class TraciSession(ApiSession):
         follow(self._api, car)
 
 
+def delay_option(milliseconds: float) -> tuple[str, str]:
+    """The option of sumo-gui for a pause with every step, which it counts per simulated second."""
+    return "--delay", str(milliseconds / DT)
+
+
 def follow(api: Any, car: str) -> None:
     """Let the view of the sumo-gui behind a module traci follow a car."""
     api.gui.trackVehicle(_VIEW, car)

@@ -15,7 +15,7 @@ from merge_cosim.cosim.attached import Address, AttachedSession
 from merge_cosim.cosim.outputs import SumoOutputs
 from merge_cosim.cosim.plant import SumoPlant
 from merge_cosim.cosim.scenes.scene_plant import ScenePlant
-from merge_cosim.cosim.session import Session, SumoOptions, TraciSession, connection_kept
+from merge_cosim.cosim.session import Session, SumoOptions, TraciSession, connection_kept, delay_option
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.full_scenes import SceneReplay
 from merge_cosim.experiments.plan import SweepRequest, plan, plan_encounters
@@ -110,7 +110,7 @@ def _open_plant(
         return SumoPlant(ramp, 1, batch.seed, lambda options: AttachedSession(options, attach), tiled=False)
     if gui_delay is None:
         return SumoPlant(ramp, 1, batch.seed, extra=extra)
-    shown = (*view_options(ramp.net.parent), "--delay", str(gui_delay))
+    shown = (*view_options(ramp.net.parent), *delay_option(gui_delay))
     plant = SumoPlant(ramp, 1, batch.seed, _open_window, (*shown, *extra))
     assert isinstance(plant.session, TraciSession)
     plant.session.follow(tile_id(0, "host"))

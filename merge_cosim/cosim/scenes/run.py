@@ -15,7 +15,7 @@ from merge_cosim.cosim.scenes.controller import HostController
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Meeting
 from merge_cosim.cosim.scenes.notes import Event
 from merge_cosim.cosim.scenes.scoring import to_be_scored
-from merge_cosim.cosim.session import SumoOptions, libsumo_started, one_line, traci_started
+from merge_cosim.cosim.session import SumoOptions, delay_option, libsumo_started, one_line, traci_started
 from merge_cosim.errors import UserError
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
@@ -164,7 +164,7 @@ def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], a
         words += ["--remote-port", "0"]  # SUMO would wait there for somebody
         api, errors = libsumo_started(words, scene.file)
     else:
-        words += ["--delay", str(gui_delay)]
+        words += delay_option(gui_delay)
         api, errors = traci_started(words, scene.file, gui=True)
     try:
         yield api

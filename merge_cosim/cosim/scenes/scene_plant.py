@@ -20,7 +20,7 @@ from merge_cosim.cosim.scenes.full_scene import FullScene
 from merge_cosim.cosim.scenes.logged import LoggedTraffic
 from merge_cosim.cosim.scenes.neighbours import SIGHT, InLane, Neighbours
 from merge_cosim.cosim.scenes.roadway import Roadway
-from merge_cosim.cosim.session import SumoOptions, follow, libsumo_started, traci_started
+from merge_cosim.cosim.session import SumoOptions, delay_option, follow, libsumo_started, traci_started
 from merge_cosim.encounter import Encounters
 from merge_cosim.ngsim.scenes import LoggedScene, PairInScene
 from merge_cosim.ngsim.sites import site as find_site
@@ -83,7 +83,7 @@ class ScenePlant:
         types = Path(self._folder.name) / "types.add.xml"
         rules.drivers.write(types)
         on_the_net = ("--no-internal-links", "true", "--additional-files", str(types))
-        window = (*view_options(ramp.net.parent), "--delay", str(gui_delay)) if self._gui else ()
+        window = () if gui_delay is None else (*view_options(ramp.net.parent), *delay_option(gui_delay))
         self._options = SumoOptions(ramp.net, seed=seed, extra=(*on_the_net, *window, *extra))
         self._traffic: LoggedTraffic | None = None
 
