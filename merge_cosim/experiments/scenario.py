@@ -204,4 +204,5 @@ def _first_problem(error: ValidationError) -> str:
         return f"the key '{shown}.kind' is missing {kinds}"
     if first["type"] == "union_tag_invalid":
         return f"{shown}.kind = {first['input']['kind']!r}: there is no such kind {kinds}"
-    return f"{shown} = {first['input']!r}: {first['msg'].removeprefix('Value error, ')}"
+    value = "" if isinstance(first["input"], dict) else f" = {first['input']!r}"
+    return f"{shown}{value}: {first['msg'].removeprefix('Value error, ')}"

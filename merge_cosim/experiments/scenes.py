@@ -94,12 +94,14 @@ class SceneBatch(Task):
         traffic, ramp = self.scenario.encounters, Ramp.load(self.scenario.ramp)
         assert isinstance(traffic, (Traffic, Routes))
         with tempfile.TemporaryDirectory(prefix="merge-cosim-") as folder:
+            announced: tuple[str, ...] = ()
             if isinstance(traffic, Traffic):
                 file = write_traffic(Path(folder), traffic.demand, ramp)
                 end, warm_up = traffic.demand.duration, traffic.demand.warm_up
             else:
                 file, warm_up = traffic.file, 0.0
-                end = traffic.end or Configuration.read(file).end
+                configuration = Configuration.read(file)
+                end, announced = traffic.end or configuration.end, configuration.hosts(traffic.host)
             yield Scene(
                 name=self.case(number),
                 file=file,
@@ -108,6 +110,7 @@ class SceneBatch(Task):
                 end=end,
                 warm_up=warm_up,
                 host=traffic.host,
+                announced=announced,
                 attention=traffic.attention,
             )
 

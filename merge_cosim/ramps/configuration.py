@@ -89,6 +89,15 @@ class Configuration:
         """Whether any vehicle or type has the role."""
         return any(one.get("key") == ROLE and one.get("value") == role for one in self._elements("param"))
 
+    def hosts(self, host: str) -> tuple[str, ...]:
+        """Ids of the vehicles and flows that are hosts whatever their route: by their role, or `host` by itself."""
+        types = {kind.get("id") for kind in self._elements("vType") if _is_host(kind)}
+        return tuple(
+            one.get("id", "")
+            for one in self._elements("vehicle", "trip", "flow")
+            if _is_host(one) or one.get("type") in types or (one.tag != "flow" and one.get("id") == host)
+        )
+
     def require(self, host: str) -> None:
         """Refuse a host's name that stands nowhere in the files.
 
@@ -136,6 +145,10 @@ def parse(file: Path) -> etree._Element:
         if parent is not None:
             parent.replace(include, parse(file.parent / include.get("href", "")))
     return root
+
+
+def _is_host(element: etree._Element) -> bool:
+    return any(one.get("key") == ROLE and one.get("value") == "host" for one in element.iter("param"))
 
 
 @lru_cache(maxsize=8)

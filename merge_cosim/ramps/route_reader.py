@@ -32,11 +32,14 @@ class _Car:
 
 
 def only_pairs(configuration: Configuration) -> bool:
-    """Whether there is nothing but as many hosts as merging cars, starting from numbers: encounters, and no traffic."""
+    """Whether there is nothing but pairs of a host and a merging car: encounters, and no traffic.
+
+    Both start from numbers, and at the same time.
+    """
     entries = [entry for file in configuration.routes for entry in _entries(parse(file)) if entry.has_start]
-    roles = [entry.role for entry in entries]
+    host, merging = ([one.vehicle.get("depart") for one in entries if one.role == role] for role in ROLES)
     everything = len(list(configuration.vehicles()))
-    return 0 < everything == len(entries) and roles.count("host") == roles.count("merging")
+    return 0 < everything == len(entries) and host == merging
 
 
 def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:

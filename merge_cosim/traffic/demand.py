@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,6 +68,10 @@ class Demand:
     wave_lasts: NonNegativeFloat = 30.0
     wave_speed: PositiveFloat = 3.0
     copies: PositiveInt = 1
+
+    def __post_init__(self) -> None:
+        if not self.warm_up < self.duration < math.inf:
+            raise ValueError(f"warm_up ({self.warm_up:g} s) must be less than duration ({self.duration:g} s), a number")
 
 
 def write_traffic(folder: Path, demand: Demand, ramp: Ramp) -> Path:

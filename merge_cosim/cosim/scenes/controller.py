@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from copy import deepcopy
 from typing import Any
 
@@ -98,16 +98,24 @@ class HostController:
     @property
     def host_count(self) -> int:
         """Hosts that have come in so far."""
-        return self._roster.host_count
+        return len(self._roster.came)
 
-    def close(self) -> None:
-        """End the meetings that are still open, and note the hosts that never came in, or that there were none."""
+    def close(self, announced: Iterable[str] = ()) -> None:
+        """End the meetings that are still open, and note the hosts that never came in, or that there were none.
+
+        Args:
+            announced: Ids of vehicles and flows that are hosts by SUMO's files.
+        """
         for meeting in list(self._open):
             self._end(meeting, Ending.CENSORED if meeting.merged_at >= 0 else Ending.NOT_NEXT)
-        for name in self._api.simulation.getPendingVehicles():
-            if self._roster.role(name) == "host":
-                line = f"host {name} never departed: no room where it was to enter"
-                self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
+        waiting = [one for one in self._api.simulation.getPendingVehicles() if self._roster.role(one) == "host"]
+        for name in waiting:
+            line = f"host {name} never departed: no room where it was to enter"
+            self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
+        known = {*waiting, *self._roster.came}
+        for name in sorted(set(announced) - known - {one.rpartition(".")[0] for one in known}):
+            line = f"host {name} never departed: not in the scene's time, or its file is not sorted by time"
+            self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
         # With time-to-teleport.remove SUMO takes cars out without saying which.
         for number in range(self._teleported() - self._teleports - self.notes.counts()[Event.TELEPORT]):
             self.notes.add(Event.TELEPORT, f"removed {number}", "SUMO took out a vehicle that had waited too long")
@@ -127,7 +135,9 @@ class HostController:
         ahead = {}
         for host in hosts:
             name, gap = vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
-            ahead[host.name] = (gap + host.min_gap, vehicle.getSpeed(name)) if name else (math.inf, 0.0)
+            gap += host.min_gap
+            seen = name and gap <= SIGHT  # SUMO looks on to the end of a lane
+            ahead[host.name] = (gap, vehicle.getSpeed(name)) if seen else (math.inf, 0.0)
         speed = np.array([host.speed for host in hosts])
         gap, leader_speed = np.array(list(ahead.values())).reshape(-1, 2).T
         led = np.isfinite(gap)
@@ -137,7 +147,8 @@ class HostController:
     def _follower_gap(self, host: str) -> float:
         """Gap to the car behind a host, bumper to bumper [m]; inf without one."""
         name, gap = self._api.vehicle.getFollower(host, SIGHT)
-        return float(gap + self._api.vehicle.getMinGap(name)) if name else math.inf
+        gap = float(gap + self._api.vehicle.getMinGap(name)) if name else math.inf
+        return gap if gap <= SIGHT else math.inf
 
     def _end_meetings(self) -> None:
         """Take in lane changes, end what is over, and forget the merging cars that nobody will meet any more."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from lxml import etree
+from pydantic import NonNegativeFloat, PositiveFloat
 
 LOGGED_TYPE = "logged"
 """Id of the type of all logged cars. A log's commands override its models until a car is released."""
@@ -26,10 +27,10 @@ class ReleasedDrivers:
 
     car_following: Literal["Krauss", "IDM", "EIDM"] = "EIDM"
     lane_changing: Literal["LC2013", "SL2015"] = "LC2013"
-    tau: float = 0.5
-    accel: float = 2.2
-    decel: float = 3.0
-    min_gap: float = 2.0
+    tau: PositiveFloat = 0.5
+    accel: PositiveFloat = 2.2
+    decel: PositiveFloat = 3.0
+    min_gap: NonNegativeFloat = 2.0
 
     def write(self, path: Path) -> None:
         """Write the type as a file for SUMO's option `additional-files`."""

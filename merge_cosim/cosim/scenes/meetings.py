@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from merge_cosim.cosim.scenes.roster import Actor
 from merge_cosim.units import FloatArray
@@ -25,8 +26,8 @@ class Attention:
         apart: Neither is further than this from the other, front to front [m].
     """
 
-    upstream: float = 150.0
-    apart: float = 80.0
+    upstream: NonNegativeFloat = 150.0
+    apart: PositiveFloat = 80.0
 
 
 DEFAULT_ATTENTION = Attention()

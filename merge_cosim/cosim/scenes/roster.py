@@ -66,7 +66,7 @@ class Roster:
 
     Attributes:
         hosts, merging: Those in the net, by SUMO's id; a merging car is forgotten once `forget` says so.
-        host_count: Hosts that have come in so far.
+        came: Names of all hosts that have come in so far.
     """
 
     def __init__(self, api: Any, lanes: RampLanes, host: str = "") -> None:
@@ -76,7 +76,7 @@ class Roster:
         self._role_of_type: dict[str, str] = {}
         self.hosts: dict[str, Actor] = {}
         self.merging: dict[str, Actor] = {}
-        self.host_count = 0
+        self.came: set[str] = set()
         self._roles_merging = any(self._type_role(kind) == "merging" for kind in api.vehicletype.getIDList())
         for name in api.vehicle.getIDList():
             self._enter(name)
@@ -132,7 +132,7 @@ class Roster:
             self.merging[name] = actor
             return
         self.hosts[name] = actor
-        self.host_count += 1
+        self.came.add(name)
 
     def _goes_on(self, host: Actor) -> bool:
         vehicle = self._api.vehicle

@@ -15,7 +15,7 @@ from merge_cosim.cosim.scenes.controller import HostController
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Meeting
 from merge_cosim.cosim.scenes.notes import Event
 from merge_cosim.cosim.scenes.scoring import to_be_scored
-from merge_cosim.cosim.session import SumoOptions, delay_option, libsumo_started, one_line, traci_started
+from merge_cosim.cosim.session import SumoOptions, connection_kept, delay_option, libsumo_started, one_line, traci_started
 from merge_cosim.errors import UserError
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
@@ -44,6 +44,7 @@ class Scene:
         end: Its end [s]; inf for when the last car has left.
         warm_up: The throughput is counted from here on [s].
         host: A vehicle, flow or type that is a host without saying so.
+        announced: Ids of vehicles and flows that are hosts by the files.
         attention: Which merging cars a host attends to.
     """
 
@@ -54,6 +55,7 @@ class Scene:
     end: float
     warm_up: float = 0.0
     host: str = ""
+    announced: tuple[str, ...] = ()
     attention: Attention = DEFAULT_ATTENTION
 
 
@@ -63,14 +65,14 @@ class SceneRun:
 
     Attributes:
         meetings: All meetings.
-        facts: Counts and means of its traffic.
+        facts: Counts and means of its traffic; None for a mean over no car.
         notes: What its user should know, a line for each event.
         effort: What it cost.
         begin: Time at which it began [s].
     """
 
     meetings: list[Meeting]
-    facts: dict[str, float]
+    facts: dict[str, float | None]
     notes: list[tuple[Event, str]]
     effort: Effort
     begin: float
@@ -123,12 +125,15 @@ def run_scene(
             time = simulation.getTime()
             if time > scene.warm_up:
                 arrived += simulation.getArrivedNumber()
-        controller.close()
+        controller.close(scene.announced if attach is None else ())
         effort.wall_s, effort.scene_s = perf_counter() - started, time - begin
-        facts: dict[str, float] = {
+        statistics = {name: float(simulation.getParameter("", key)) for name, key in _STATISTICS.items()}
+        left = int(simulation.getParameter("", "device.tripinfo.count"))
+        facts: dict[str, float | None] = {
             "simulated_s": round(time - begin, 3),
             "throughput_veh_h": round(HOUR * arrived / max(time - max(scene.warm_up, begin), setting.dt), 1),
-            **{name: float(simulation.getParameter("", key)) for name, key in _STATISTICS.items()},
+            **statistics,
+            **{name: round(statistics[name], 2) if left else None for name in ("mean_speed", "time_loss_s")},
             "hosts": controller.host_count,
             "meetings": len(controller.finished),
             "meetings_scored": len(to_be_scored(controller.finished)),
@@ -167,7 +172,8 @@ def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], a
         words += delay_option(gui_delay)
         api, errors = traci_started(words, scene.file, gui=True)
     try:
-        yield api
+        with connection_kept():
+            yield api
     except errors as error:
         raise UserError(f"{scene.file}: SUMO stopped: {one_line(error)}") from None
     finally:

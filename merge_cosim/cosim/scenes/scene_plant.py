@@ -96,7 +96,7 @@ class ScenePlant:
         self._case, self._pair, self._age, self._start = case, pair, 0, pair.start
         self._merge_position = float(encounters.merge_position[case])
         self._host_log, self._merging_log = log.host_station[case], log.merging_station[case]
-        self._takes_over = min(round(self._rules.take_over / DT), len(self._host_log) - 1)
+        self._takes_over = round(min(self._rules.take_over / DT, len(self._host_log) - 1))
         self._lengths = dict(zip(scene.car.tolist(), scene.length.tolist(), strict=True))
         self._host_lane = find_site(scene.site).host_lane
         self.neighbours = Neighbours(self._lengths[pair.host], SIGHT)

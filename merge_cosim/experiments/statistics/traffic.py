@@ -28,6 +28,7 @@ def scene_tables(scenes: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
     facts = pd.DataFrame([{k: v for k, v in scene.items() if k != "notes"} for scene in scenes])
     if not len(facts):
         return dict.fromkeys((SCENES_CSV, TRAFFIC_CSV, NOTES_CSV), facts)
+    facts = facts.astype({name: float for name in MEANS if name in facts})  # None is missing
     groups = facts.groupby(GROUP, sort=True)
     columns = [groups["scene"].count().rename("scenes")]
     for name in facts.columns.difference([*GROUP, "scene", "seed"], sort=False):
