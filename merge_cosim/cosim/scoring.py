@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import PositiveFloat
+from pydantic import AllowInfNan, PositiveFloat
 
 from merge_cosim.cosim.decisions import decisions
 from merge_cosim.cosim.likeness import likeness
@@ -22,6 +22,8 @@ GOAL = 50.0
 USUAL_ACCELERATION = 1.0
 """Acceleration [m/s^2] by which the length of a case is guessed."""
 
+_Seconds = Annotated[PositiveFloat, AllowInfNan(False)]
+
 
 @dataclass(frozen=True)
 class Rules:
@@ -33,8 +35,8 @@ class Rules:
         overlap_from: `both`: scored once both cars are past the merging point; `lane_change`: once the merging car is.
     """
 
-    horizon: PositiveFloat = 3.0
-    time_out: PositiveFloat = 40.0
+    horizon: _Seconds = 3.0
+    time_out: _Seconds = 40.0
     overlap_from: Literal["both", "lane_change"] = "both"
 
     @property

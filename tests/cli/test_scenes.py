@@ -190,9 +190,12 @@ def test_a_mistake_that_sumo_meets_on_the_way(tmp_path):
 def test_hosts_that_never_depart_are_told(tmp_path):
     blocked = '<vehicle id="block" type="car" depart="0" departLane="0" departPos="8" departSpeed="0" route="main">'
     blocked += '<stop lane="main_in_0" endPos="9" duration="1000"/></vehicle><flow id="joining"'
-    own_files(tmp_path, ROUTES.replace('<flow id="joining"', blocked, 1), '<end value="60"/>')
+    late = '<vehicle id="late" type="host" depart="61" route="main"/></routes>'
+    routes = ROUTES.replace('<flow id="joining"', blocked, 1).replace("</routes>", late)
+    own_files(tmp_path, routes, '<end value="60"/>')
     out, done = swept(tmp_path, "my.sumocfg", "--method", "acc")
-    assert "hosts_not_departed: 8, such as: host h.0 never departed" in done.stderr
+    assert "hosts_not_departed: 9, such as: host h.0 never departed" in done.stderr
+    assert "host late never departed: not in the scene's time" in (out / "notes.csv").read_text()
     assert len(rows(out)) == 0
     report = merge_cosim("report", out, cwd=tmp_path)
     assert report.returncode == 2

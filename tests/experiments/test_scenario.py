@@ -23,6 +23,19 @@ def test_no_value_lies_beyond_the_end(first, last, step, values):
     assert parse_variation(f"acc.d0={first}:{last}:{step}")[1] == pytest.approx(values)
 
 
+@pytest.mark.parametrize(
+    ("setting", "value", "expected"),
+    [
+        ("encounters.demand.warm_up", 600, r"demand: warm_up \(600 s\) must be less than duration \(600 s\)"),
+        ("encounters.attention.apart", -5, "apart = -5: Input should be greater than 0"),
+        ("test.time_out", float("inf"), "time_out = inf: Input should be a finite number"),
+    ],
+)
+def test_values_that_make_no_sense_are_refused(setting, value, expected):
+    with pytest.raises(UserError, match=expected):
+        load_scenario("traffic-light", {setting: value})
+
+
 @pytest.mark.parametrize("text", ["acc.d0", "acc.d0=", "acc.d0=1:2", "acc.d0=2:1:1", "acc.d0=1:2:0", "acc.d0=1:inf:1"])
 def test_what_cannot_be_varied_is_refused(text):
     with pytest.raises(UserError, match=r"--vary acc\.d0"):

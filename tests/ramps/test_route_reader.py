@@ -11,7 +11,7 @@ from merge_cosim.errors import UserError
 from merge_cosim.ramps.configuration import Configuration
 from merge_cosim.ramps.new import RampNumbers, new_ramp
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.ramps.route_reader import read_sumocfg
+from merge_cosim.ramps.route_reader import only_pairs, read_sumocfg
 from merge_cosim.ramps.routes import write_encounter
 
 ROUTES = """<routes>
@@ -55,6 +55,14 @@ def test_a_file_of_ones_own(tmp_path):
     assert encounters.case.tolist() == ["h0_m0"]
     assert (encounters.host_station[0], encounters.merging_station[0]) == (-95.0, -90.0)
     assert (encounters.host_length[0], encounters.merging_length[0]) == (4.6, 5.0)
+
+
+def test_cars_that_depart_at_other_times_are_no_pair(tmp_path):
+    alone = ROUTES.replace('<vehicle id="bystander" type="other" route="through" depart="0"/>', "")
+    file = write(tmp_path)
+    for routes, expected in ((alone, True), (alone.replace('depart="0"', 'depart="9"', 1), False), (ROUTES, False)):
+        (tmp_path / "my.rou.xml").write_text(routes)
+        assert only_pairs(Configuration.read(file)) == expected
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,14 @@ from merge_cosim.cosim.scenes.controller import HostController
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Meeting
 from merge_cosim.cosim.scenes.notes import Event
 from merge_cosim.cosim.scenes.scoring import to_be_scored
-from merge_cosim.cosim.session import SumoOptions, connection_kept, delay_option, libsumo_started, one_line, traci_started
+from merge_cosim.cosim.session import (
+    SumoOptions,
+    connection_kept,
+    delay_option,
+    libsumo_started,
+    one_line,
+    traci_started,
+)
 from merge_cosim.errors import UserError
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
@@ -72,7 +79,7 @@ class SceneRun:
     """
 
     meetings: list[Meeting]
-    facts: dict[str, float | None]
+    facts: dict[str, Any]
     notes: list[tuple[Event, str]]
     effort: Effort
     begin: float
@@ -129,7 +136,7 @@ def run_scene(
         effort.wall_s, effort.scene_s = perf_counter() - started, time - begin
         statistics = {name: float(simulation.getParameter("", key)) for name, key in _STATISTICS.items()}
         left = int(simulation.getParameter("", "device.tripinfo.count"))
-        facts: dict[str, float | None] = {
+        facts: dict[str, Any] = {
             "simulated_s": round(time - begin, 3),
             "throughput_veh_h": round(HOUR * arrived / max(time - max(scene.warm_up, begin), setting.dt), 1),
             **statistics,
