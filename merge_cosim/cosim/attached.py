@@ -96,18 +96,25 @@ class AttachedSession(ApiSession):
 
 
 def refuse_other_net(api: Any, net: Path, edges: set[str], address: Address) -> None:
-    """Close the connection where SUMO runs on a net in which these edges are not as in ours: stations would be wrong.
+    """Close the connection where SUMO runs on another net than ours.
 
     Raises:
         UserError: It does.
     """
+    if amiss := other_net(api, net, edges):
+        api.close()
+        raise UserError(f"--attach {address}: {amiss}")
+
+
+def other_net(api: Any, net: Path, edges: set[str]) -> str:
+    """What is amiss with the net that SUMO runs on, if these edges are not as in ours: stations would be wrong."""
     running = set(api.lane.getIDList())
     ours = read_net(net)
     for lane in (lane for edge in sorted(edges) for lane in ours.getEdge(edge).getLanes()):
         name, length = lane.getID(), lane.getLength()
         if name not in running or abs(api.lane.getLength(name) - length) > TOLERANCE:
-            api.close()
-            raise UserError(f"--attach {address}: SUMO has another net: no lane {name} of {length:g} m; load {net}")
+            return f"SUMO has another net: no lane {name} of {length:g} m; load {net}"
+    return ""
 
 
 def _same(found: str, wanted: str) -> bool:

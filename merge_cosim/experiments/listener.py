@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 import traci
 
+from merge_cosim.cosim.attached import other_net
 from merge_cosim.cosim.scenes.controller import HostController
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention
 from merge_cosim.cosim.scoring import Rules
@@ -21,6 +22,7 @@ from merge_cosim.experiments.work import free_law
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.observation import Setting
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.tiles import tile_id
 from merge_cosim.units import DT, TOLERANCE
 
 
@@ -63,8 +65,8 @@ class HostListener(traci.StepListener):  # type: ignore[misc]
             seed: Seed of the methods' random streams.
 
         Raises:
-            UserError: There is no such ramp, method or parameter, or SUMO runs with other steps or with lanes inside
-                junctions.
+            UserError: There is no such ramp, method or parameter, or SUMO runs on another net, with other steps or with
+                lanes inside junctions.
         """
         self._api, self._ramp, self._rules = api, Ramp.load(ramp), rules or Rules()
         self._method = Method.parse(method, settings)
@@ -74,6 +76,10 @@ class HostListener(traci.StepListener):  # type: ignore[misc]
         self._setting = Setting(speed_limit or self._ramp.speed_limit)
         if abs(api.simulation.getDeltaT() - DT) > TOLERANCE or api.simulation.getOption("no-internal-links") != "true":
             raise UserError(f"HostListener: start SUMO with --step-length {DT} --no-internal-links true")
+        edges = {*self._ramp.main_route, *self._ramp.ramp_route}
+        copied = tile_id(0, self._ramp.main_route[0]) in api.edge.getIDList()
+        if not copied and (amiss := other_net(api, self._ramp.net, edges)):
+            raise UserError(f"HostListener: {amiss}")
         self._time = api.simulation.getTime()
         driver = self._method.driver(self._model)
         self.controller = HostController(

@@ -231,17 +231,18 @@ def test_a_listener_refuses_other_conditions(minute):
 import libsumo, sys
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.listener import HostListener
-step, several = sys.argv[1:]
+step, several, ramp = sys.argv[1:]
 libsumo.start(["sumo", "-c", "files/traffic.sumocfg", "--no-step-log", "true", "--step-length", step])
 try:
-    libsumo.addStepListener(HostListener(libsumo, "us101", "acc"))
+    libsumo.addStepListener(HostListener(libsumo, ramp, "acc"))
     libsumo.simulationStep(float(several))
 except UserError as error:
     print(error)
 """
     for arguments, expected in (
-        (("0.2", "0"), "start SUMO with --step-length 0.1"),
-        (("0.1", "1"), "several steps at once; call simulationStep() without a time"),
+        (("0.2", "0", "us101"), "start SUMO with --step-length 0.1"),
+        (("0.1", "0", "designed"), "HostListener: SUMO has another net: no lane main_out_0 of"),
+        (("0.1", "1", "us101"), "several steps at once; call simulationStep() without a time"),
     ):
         command = [sys.executable, "-c", script, *arguments]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
