@@ -135,9 +135,7 @@ class HostController:
         ahead = {}
         for host in hosts:
             name, gap = vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
-            gap += host.min_gap
-            seen = name and gap <= SIGHT  # SUMO looks on to the end of a lane
-            ahead[host.name] = (gap, vehicle.getSpeed(name)) if seen else (math.inf, 0.0)
+            ahead[host.name] = (gap + host.min_gap, vehicle.getSpeed(name)) if name else (math.inf, 0.0)
         speed = np.array([host.speed for host in hosts])
         gap, leader_speed = np.array(list(ahead.values())).reshape(-1, 2).T
         led = np.isfinite(gap)
@@ -147,8 +145,7 @@ class HostController:
     def _follower_gap(self, host: str) -> float:
         """Gap to the car behind a host, bumper to bumper [m]; inf without one."""
         name, gap = self._api.vehicle.getFollower(host, SIGHT)
-        gap = float(gap + self._api.vehicle.getMinGap(name)) if name else math.inf
-        return gap if gap <= SIGHT else math.inf
+        return float(gap + self._api.vehicle.getMinGap(name)) if name else math.inf
 
     def _end_meetings(self) -> None:
         """Take in lane changes, end what is over, and forget the merging cars that nobody will meet any more."""
