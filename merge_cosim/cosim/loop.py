@@ -9,27 +9,18 @@ from time import perf_counter
 
 import numpy as np
 
-from merge_cosim.control.base import Controller
+from merge_cosim.cosim.driver import Driver
 from merge_cosim.cosim.plant import Plant
 from merge_cosim.cosim.scoring import Rules, Watch, expected_cycles, score
 from merge_cosim.cosim.tracks import Recorder, Tracks
 from merge_cosim.encounter import NEVER, Encounters
-from merge_cosim.intention.base import Estimator
 from merge_cosim.observation import Observation, Setting
 from merge_cosim.streams import stream_keys
 from merge_cosim.traffic.base import MergingCar
-from merge_cosim.units import DT, AnyArray, BoolArray, FloatArray, IntArray
+from merge_cosim.units import DT, AnyArray, FloatArray, IntArray
 
 SCORED_TOGETHER = 128
 """Encounters that are over wait until so many can be scored in one go; their tracks then still fit the cache."""
-
-
-@dataclass(frozen=True)
-class Driver:
-    """A method, ready to drive: an estimator and a controller."""
-
-    estimator: Estimator
-    controller: Controller
 
 
 @dataclass
@@ -128,8 +119,7 @@ class _Loop:
         self.closed_form = np.zeros((2, count))
         self.effort = Effort()
         self.traces: dict[int, dict[str, list[float]]] = {case: defaultdict(list) for case in traced}
-        driver.estimator.start(count, setting)
-        driver.controller.start(count, setting)
+        driver.start(count, setting)
         merging_car.start(encounters, count, setting)
         self.keys = stream_keys(encounters.case, seed)
         self.case = np.full(count, -1)
@@ -155,17 +145,14 @@ class _Loop:
         now = self.recorder.seen
         observed = self.merging_car.observed_speed(self.age, now.merging_speed)
         seen = now if observed is now.merging_speed else replace(now, merging_speed=observed)
-        log_odds = self.driver.estimator.update(seen)
-        not_yield = log_odds >= 0.0
-        target = np.where(now.merging_in_lane, now.merging_ahead, not_yield)
-        acceleration = self.driver.controller.command(seen, log_odds, target)
+        log_odds, acceleration = self.driver.decide(seen)
         np.maximum(now.host_speed + acceleration * self.setting.dt, 0.0, out=self.speeds[0])
         decided = perf_counter()
         self.speeds[1] = self.merging_car.next_speed(self.age, now)
         self.speeds *= self.active
         self.recorder.believed(log_odds)
         if self.traced:
-            self._trace(now, log_odds, not_yield, self.speeds[0])
+            self._trace(now, log_odds, self.speeds[0])
         self.plant.advance(self.speeds)
         self.closed_form += self.speeds * DT
         self.recorder.moved(self.plant.state)
@@ -189,8 +176,7 @@ class _Loop:
         self.closed_form[:, rows] = start[:2]
         self.recorder.placed(rows, start)
         self.merging_car.reset(rows, cases)
-        self.driver.estimator.reset(rows, self.encounters.label[cases], self.keys[cases])
-        self.driver.controller.reset(rows)
+        self.driver.reset(rows, self.encounters.label[cases], self.keys[cases])
         self.watch.reset(rows, self.score_until[cases])
 
     def _finish(self, rows: IntArray) -> None:
@@ -216,7 +202,7 @@ class _Loop:
         self.effort.encounter_cycles += cycles
         self.effort.vehicle_steps += 2 * cycles
 
-    def _trace(self, now: Observation, log_odds: FloatArray, not_yield: BoolArray, next_speed: FloatArray) -> None:
+    def _trace(self, now: Observation, log_odds: FloatArray, next_speed: FloatArray) -> None:
         for row in np.flatnonzero(np.isin(self.case, list(self.traced))).tolist():
             trace = self.traces[int(self.case[row])]
             for name, value in (
@@ -227,6 +213,6 @@ class _Loop:
                 ("merging_station_m", now.merging_station[row]),
                 ("merging_speed_m_s", now.merging_speed[row]),
                 ("log_odds", log_odds[row]),
-                ("not_yield", not_yield[row]),
+                ("not_yield", log_odds[row] >= 0.0),
             ):
                 trace[name].append(float(value))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AllowInfNan, PositiveFloat
+from pydantic import Field
 
 from merge_cosim.cosim.decisions import decisions
 from merge_cosim.cosim.likeness import likeness
@@ -22,7 +22,7 @@ GOAL = 50.0
 USUAL_ACCELERATION = 1.0
 """Acceleration [m/s^2] by which the length of a case is guessed."""
 
-_Seconds = Annotated[PositiveFloat, AllowInfNan(False)]
+_Seconds = Annotated[float, Field(gt=0, le=3600)]  # every cycle until then has room in the memory
 
 
 @dataclass(frozen=True)

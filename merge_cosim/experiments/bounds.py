@@ -18,7 +18,8 @@ import pandas as pd
 from merge_cosim.control.acc import Acc
 from merge_cosim.control.base import Controller
 from merge_cosim.control.brake import Brake
-from merge_cosim.cosim.loop import Driver, simulate
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import simulate
 from merge_cosim.cosim.plant import NumpyPlant
 from merge_cosim.cosim.scoring import GOAL, Rules
 from merge_cosim.encounter import Encounters

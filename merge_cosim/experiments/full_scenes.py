@@ -10,7 +10,8 @@ from typing import Self
 import numpy as np
 import pyarrow as pa
 
-from merge_cosim.cosim.loop import Driver, Effort, Run
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import Effort, Run
 from merge_cosim.cosim.plant import Plant
 from merge_cosim.cosim.scenes.scene_plant import Place, ScenePlant
 from merge_cosim.cosim.scoring import HOST_INTO_LEADER

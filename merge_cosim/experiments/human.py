@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from merge_cosim.control.base import Controller
-from merge_cosim.cosim.loop import Driver, Effort, Run, simulate
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import Effort, Run, simulate
 from merge_cosim.cosim.plant import NumpyPlant
 from merge_cosim.cosim.scoring import Rules
 from merge_cosim.encounter import Encounters
-from merge_cosim.intention.base import Estimator
 from merge_cosim.observation import Observation, Setting
+from merge_cosim.streams import Keys
 from merge_cosim.traffic.base import MergingCar
 from merge_cosim.traffic.replay import Replay
-from merge_cosim.units import BoolArray, FloatArray, IntArray
+from merge_cosim.units import FloatArray, IntArray
 
 
 def simulate_human(
@@ -34,7 +34,7 @@ def simulate_human(
         traced: Indices of the cases to record cycle by cycle.
     """
     plant = _LoggedHosts(encounters, setting)
-    run = simulate(plant, encounters, Driver(_Nobody(), _Idle()), merging_car, rules, setting, traced)
+    run = simulate(plant, encounters, _Nobody(), merging_car, rules, setting, traced)
     undecided = run.columns | {"last_decision": np.full(len(encounters), -1.0)}
     return replace(run, columns=undecided, effort=Effort())
 
@@ -61,17 +61,14 @@ class _LoggedHosts(NumpyPlant):
         self._age += 1
 
 
-@dataclass(kw_only=True)
-class _Nobody(Estimator):
-    """Believes nothing."""
+class _Nobody(Driver):
+    """Believes and commands nothing."""
 
-    def update(self, seen: Observation) -> FloatArray:
-        return np.full(len(seen.host_station), np.nan)
+    def __init__(self) -> None: ...
 
+    def start(self, count: int, setting: Setting) -> None: ...
 
-@dataclass(kw_only=True)
-class _Idle(Controller):
-    """Commands nothing."""
+    def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None: ...
 
-    def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
-        return np.zeros(len(seen.host_station))
+    def decide(self, seen: Observation) -> tuple[FloatArray, FloatArray]:
+        return np.full_like(seen.host_station, np.nan), np.zeros_like(seen.host_station)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from merge_cosim.control.base import controllers
-from merge_cosim.cosim.loop import Driver
+from merge_cosim.cosim.driver import Driver
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.encounter_sources import steps_between

@@ -11,7 +11,8 @@ import pyarrow as pa
 
 from merge_cosim.control.acc import Acc
 from merge_cosim.control.base import controllers
-from merge_cosim.cosim.loop import Driver, Effort, Run, simulate
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import Effort, Run, simulate
 from merge_cosim.cosim.plant import Plant, SumoPlant
 from merge_cosim.cosim.scenes.scene_plant import ScenePlant
 from merge_cosim.cosim.scoring import expected_cycles

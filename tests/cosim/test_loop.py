@@ -5,7 +5,8 @@ import pytest
 from cases import random_encounters
 
 from merge_cosim.control.base import controllers
-from merge_cosim.cosim.loop import Driver, Run, simulate
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import Run, simulate
 from merge_cosim.cosim.plant import NumpyPlant, SumoPlant
 from merge_cosim.cosim.scoring import Rules
 from merge_cosim.encounter import Encounters

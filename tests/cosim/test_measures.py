@@ -6,7 +6,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from merge_cosim.control.base import controllers
-from merge_cosim.cosim.loop import Driver, simulate
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import simulate
 from merge_cosim.cosim.plant import NumpyPlant
 from merge_cosim.cosim.scoring import KINDS, Rules
 from merge_cosim.experiments.outcome import post_encroachment

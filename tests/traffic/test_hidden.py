@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from merge_cosim.control.base import controllers
-from merge_cosim.cosim.loop import Driver, simulate
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import simulate
 from merge_cosim.cosim.plant import NumpyPlant
 from merge_cosim.cosim.scoring import Rules
 from merge_cosim.encounter import Intention

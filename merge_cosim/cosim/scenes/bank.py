@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from merge_cosim.cosim.loop import Driver
+from merge_cosim.cosim.driver import Driver
 from merge_cosim.cosim.scenes.meetings import Meeting
 from merge_cosim.encounter import Intention
 from merge_cosim.observation import Observation, Setting
@@ -33,8 +33,7 @@ class Bank:
     def __init__(self, driver: Driver, setting: Setting) -> None:
         """Take a method of its own."""
         self._driver = driver
-        driver.estimator.start(ROWS, setting)
-        driver.controller.start(ROWS, setting)
+        driver.start(ROWS, setting)
         self._seen = np.repeat(_NOBODY[:, None], ROWS, axis=1)
         self._free = list(range(ROWS))[::-1]
         self._rows: dict[Meeting, int] = {}
@@ -50,8 +49,7 @@ class Bank:
         self._rows[meeting] = row
         self._seen[4:, row] = meeting.host.length, meeting.merging.length
         key = stream_keys(np.array([f"{meeting.host.name} {meeting.merging.name}"]), seed)
-        self._driver.estimator.reset(np.array([row]), np.array([int(Intention.UNKNOWN)]), key)
-        self._driver.controller.reset(np.array([row]))
+        self._driver.reset(np.array([row]), np.array([int(Intention.UNKNOWN)]), key)
 
     def end(self, meeting: Meeting) -> None:
         """Take its row back."""
@@ -70,9 +68,6 @@ class Bank:
         for meeting, row in self._rows.items():
             point, host, merging = meeting.merging_point(merging_point), meeting.host, meeting.merging
             self._seen[:4, row] = host.x - point, host.speed, merging.x - point, merging.speed
-        seen = Observation(*self._seen)
-        log_odds = self._driver.estimator.update(seen)
-        target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
-        acceleration = self._driver.controller.command(seen, log_odds, target)
+        log_odds, acceleration = self._driver.decide(Observation(*self._seen))
         for meeting, row in self._rows.items():
             yield Decided(meeting, float(log_odds[row]), float(acceleration[row]))

@@ -11,7 +11,7 @@ import numpy as np
 
 from merge_cosim.control.acc import Acc
 from merge_cosim.control.law import FollowingLaw
-from merge_cosim.cosim.loop import Driver
+from merge_cosim.cosim.driver import Driver
 from merge_cosim.cosim.scenes.bank import Bank
 from merge_cosim.cosim.scenes.lanes import Part, RampLanes
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Ending, Meeting

@@ -10,7 +10,8 @@ from time import perf_counter
 from typing import Any
 
 from merge_cosim.cosim.attached import Address, attached_to, refuse_other_net
-from merge_cosim.cosim.loop import Driver, Effort
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import Effort
 from merge_cosim.cosim.scenes.controller import HostController
 from merge_cosim.cosim.scenes.meetings import DEFAULT_ATTENTION, Attention, Meeting
 from merge_cosim.cosim.scenes.notes import Event

@@ -14,7 +14,7 @@ import numpy as np
 from merge_cosim.control.acc import Acc
 from merge_cosim.control.base import Controller
 from merge_cosim.control.law import FollowingLaw
-from merge_cosim.cosim.loop import Driver
+from merge_cosim.cosim.driver import Driver
 from merge_cosim.cosim.plant import COLORS
 from merge_cosim.cosim.scenes.full_scene import FullScene
 from merge_cosim.cosim.scenes.logged import LoggedTraffic

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import libsumo
 
 from merge_cosim.control.acc import Acc
-from merge_cosim.cosim.loop import Driver
+from merge_cosim.cosim.driver import Driver
 from merge_cosim.cosim.scenes.controller import HostController
 from merge_cosim.intention.base import estimators
 from merge_cosim.observation import Setting

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from merge_cosim.control.base import Controller, controllers
-from merge_cosim.cosim.loop import Driver
+from merge_cosim.cosim.driver import Driver
 from merge_cosim.cosim.scenes.bank import ROWS, Bank
 from merge_cosim.cosim.scenes.meetings import Meeting
 from merge_cosim.cosim.scenes.roster import Actor

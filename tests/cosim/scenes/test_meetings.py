@@ -5,7 +5,8 @@ import pytest
 from cases import random_encounters
 
 from merge_cosim.control.base import controllers
-from merge_cosim.cosim.loop import Driver, simulate
+from merge_cosim.cosim.driver import Driver
+from merge_cosim.cosim.loop import simulate
 from merge_cosim.cosim.plant import NumpyPlant
 from merge_cosim.cosim.scenes.meetings import Ending, Meeting
 from merge_cosim.cosim.scenes.roster import Actor
