@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
 import pyarrow as pa
 
-import merge_cosim
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.executors import Finished
+from merge_cosim.experiments.identity import digest, digest_of, ramp_files, software
 from merge_cosim.experiments.pieces import Handout, Piece
-from merge_cosim.experiments.plan import versions
 from merge_cosim.experiments.work import Task, Workplace
 from merge_cosim.files import cache_folder, write_atomically
-from merge_cosim.ramps.definition import FILE_NAME
-from merge_cosim.ramps.ramp import Ramp, find_ramp
+from merge_cosim.ramps.ramp import find_ramp
 from merge_cosim.registry import load_plugin
 
 LOCAL = "local"
@@ -127,9 +123,7 @@ class Cluster:
             _compare(theirs, software(), f"worker {worker}")
 
     def _kit(self, ramp: str) -> Kit:
-        folder = find_ramp(ramp)
-        files = (folder / FILE_NAME, Ramp.load(ramp).net)
-        return Kit(software(), {file.name: file.read_bytes() for file in files}, folder.resolve().name, self._plugins)
+        return Kit(software(), ramp_files(ramp), find_ramp(ramp).resolve().name, self._plugins)
 
     def _result(self, future: Any, piece: Piece) -> tuple[pa.Table, Effort]:
         try:
@@ -137,14 +131,6 @@ class Cluster:
         except self._distributed.scheduler.KilledWorker as error:
             raise UserError(f"{piece}: several workers died while running these cases ({error})") from None
         return rows, effort
-
-
-@cache
-def software() -> Mapping[str, str]:
-    """Versions of what results depend on, and a digest of this package's source: two checkouts may bear one version."""
-    folder = Path(merge_cosim.__file__).parent
-    source = {file.relative_to(folder).as_posix(): file.read_bytes() for file in folder.rglob("*.py")}
-    return versions() | {"merge-cosim's source": _digest(source)}
 
 
 def _compare(theirs: Mapping[str, str], ours: Mapping[str, str], who: str) -> None:
@@ -181,23 +167,18 @@ def run_shipped(task: Task, kit: Kit) -> tuple[pa.Table, Effort]:
 
 
 def _load_shipped(name: str, content: bytes) -> None:
-    digest = hashlib.sha256(content).hexdigest()
+    held = digest(content)
     if name not in _plugins_here:
         load_plugin(_unpack("plugins", {name: content}, "") / name)
-        _plugins_here[name] = digest
-    elif _plugins_here[name] != digest:
+        _plugins_here[name] = held
+    elif _plugins_here[name] != held:
         raise UserError(f"--dask: the workers have loaded another {name} before; restart them")
 
 
 def _unpack(kind: str, files: Mapping[str, bytes], name: str) -> Path:
     """Write files that came along into a folder of the cache that is named by their content."""
-    folder = cache_folder("shipped", kind, _digest(files), name)
+    folder = cache_folder("shipped", kind, digest_of(files), name)
     for key, content in files.items():
         if not (folder / key).is_file():
             write_atomically(folder / key, content)
     return folder
-
-
-def _digest(files: Mapping[str, bytes]) -> str:
-    """A short hash of files by name."""
-    return hashlib.sha256(b"".join(key.encode() + content for key, content in sorted(files.items()))).hexdigest()[:16]

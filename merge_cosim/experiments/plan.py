@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import platform
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-import merge_cosim
 from merge_cosim.encounter import Encounters
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.encounter_sources import Routes, Traffic
@@ -79,6 +75,9 @@ class SweepRequest:
 def plan(request: SweepRequest) -> list[Task]:
     """Work out what to run, one task per (scenario, variation, method); all mistakes of the user show here.
 
+    In whatever order the user names scenarios and methods, the tasks come in the same one: a resumed sweep knows its
+    pieces by their numbers.
+
     Raises:
         UserError: Something asked for does not exist or does not fit.
     """
@@ -86,14 +85,18 @@ def plan(request: SweepRequest) -> list[Task]:
         load_plugin(plugin)
     loaded: dict[str, Encounters] = {}
     tasks: list[Task] = []
+    labels: set[str] = set()
     for varied, values in [("", [None]), *request.variations]:
         for value in values:
+            label = f"{varied}={value}" if varied else ""
+            if label in labels:  # asked for twice
+                continue
+            labels.add(label)
             settings = request.settings | ({varied: value} if varied else {})
             of_scenario, of_components = split_settings(settings)
             methods = _methods(request.methods, of_components)
             if varied in of_components:
                 methods = [one for one in methods if varied.partition(".")[0] in (one.estimator, one.controller)]
-            label = f"{varied}={value}" if varied else ""
             for scenario in _scenarios(request.scenarios, of_scenario, varied):
                 if scenario.is_scene:
                     tasks += _scene_batches(scenario, label, methods, request)
@@ -105,7 +108,7 @@ def plan(request: SweepRequest) -> list[Task]:
     if not tasks:
         raise UserError("nothing to run: no method fits the scenarios")
     reference_of(method_names(request, tasks), request.against)
-    return tasks
+    return sorted(tasks, key=lambda task: (task.scenario.name, task.variation, task.method.name))
 
 
 def plan_encounters(request: SweepRequest) -> list[Batch]:
@@ -129,17 +132,20 @@ def method_names(request: SweepRequest, tasks: Sequence[Task]) -> list[str]:
 
 def _scenarios(names: Sequence[str], settings: dict[str, Any], varied: str) -> list[Scenario]:
     """Load the scenarios; one that does not know what is varied is left as it is, if another does."""
-    loaded, refused = [], []
+    loaded, refused = {}, []
     for name in dict.fromkeys(names):
         try:
-            loaded.append(load_scenario(name, settings))
+            scenario = load_scenario(name, settings)
+            if scenario.name in loaded:
+                raise UserError(f"{name}: another scenario is called '{scenario.name}', too; rename the file")
+            loaded[scenario.name] = scenario
         except UserError as error:
             if varied not in settings:
                 raise
             refused.append(error)
     if not loaded:
         raise refused[0]
-    return loaded
+    return list(loaded.values())
 
 
 def _methods(names: Sequence[str], settings: dict[str, Any]) -> list[Method]:
@@ -248,36 +254,3 @@ def _refuse_trained(scenario: Scenario, encounters: Encounters, model: Intention
             f"scenario {scenario.name}: model {model.name} was trained on {len(known)} of its merging cars "
             f"(such as {known[0]}); choose another --model or split"
         )
-
-
-def versions() -> dict[str, str]:
-    """Versions of what results depend on."""
-    return {
-        "merge-cosim": merge_cosim.__version__,
-        "libsumo": version("libsumo"),
-        "numpy": version("numpy"),
-        "python": platform.python_version(),
-    }
-
-
-def identity(request: SweepRequest, tasks: list[Task]) -> dict[str, Any]:
-    """What makes two sweeps the same: the same rows come out of the same identity."""
-    models = {task.model.name: task.model for task in tasks if task.model}
-    return {
-        "versions": versions(),
-        "seed": request.seed,
-        "methods": sorted({task.method.name for task in tasks}),
-        "settings": {key: str(value) for key, value in request.settings.items()},
-        "variations": [[name, [str(value) for value in values]] for name, values in request.variations],
-        "models": {name: _digest(model.to_json()) for name, model in models.items()},
-        "scenarios": {
-            " ".join(filter(None, (task.scenario.name, task.variation))): task.scenario.model_dump(mode="json")
-            for task in tasks
-        },
-        "encounters": _digest("".join(task.digest() for task in tasks)),
-        "plugins": {plugin.name: hashlib.sha256(plugin.read_bytes()).hexdigest()[:16] for plugin in request.plugins},
-    }
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -13,9 +13,10 @@ import pandas as pd
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.experiments.alone import run_alone
 from merge_cosim.experiments.executors import executor_for
+from merge_cosim.experiments.identity import identity
 from merge_cosim.experiments.methods import ORACLE_BEST
 from merge_cosim.experiments.pieces import Handout, Piece, cut
-from merge_cosim.experiments.plan import SweepRequest, identity, method_names, plan
+from merge_cosim.experiments.plan import SweepRequest, method_names, plan
 from merge_cosim.experiments.statistics import belief, calibration, oracle_best, strata, summarise
 from merge_cosim.experiments.statistics.comparison import reference_of
 from merge_cosim.experiments.statistics.traffic import scene_tables

@@ -73,7 +73,7 @@ def _differences(folders: list[ResultFolder], frames: list[pd.DataFrame]) -> lis
     """What a reader must know before trusting the comparison, one line each."""
     lines = []
     manifests = [folder.read_json(MANIFEST) for folder in folders]
-    for name in ("versions", "seed", "models", "settings", "plugins", "scenarios"):
+    for name in ("versions", "seed", "models", "settings", "plugins", "ramps", "scenarios"):
         values = [manifest.get(name) for manifest in manifests]
         if values[0] != values[1]:
             lines.append(f"{name} differ: {_differing(values[0], values[1])}")

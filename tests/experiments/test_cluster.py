@@ -143,7 +143,8 @@ def test_without_dask_installed_there_is_one_line(tmp_path):
 
 def test_other_versions_are_refused():
     from merge_cosim.errors import UserError
-    from merge_cosim.experiments.cluster import Kit, run_shipped, software
+    from merge_cosim.experiments.cluster import Kit, run_shipped
+    from merge_cosim.experiments.identity import software
     from merge_cosim.experiments.pieces import cut
     from merge_cosim.experiments.plan import SweepRequest, plan
 
