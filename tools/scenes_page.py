@@ -41,7 +41,7 @@ def run_all(data: Path, out: Path, jobs: int) -> tuple[pd.DataFrame, pd.DataFram
     rows, facts = [], []
     for name, varied in (("us101-replay", []), ("us101-scene", variations)):
         request = SweepRequest([name], METHODS, variations=varied, data=data, source="ngsim", jobs=jobs)
-        sweep(request, out / name, reuse=True)
+        sweep(request, out / name, resume=True)
         rows.append(ResultFolder(out / name).results().to_pandas())
         if varied:
             facts.append(pd.read_csv(out / name / SCENES_CSV, keep_default_na=False))

@@ -88,7 +88,7 @@ def sweep(
         dask=dask,
         against=against,
     )
-    how = f"interrupted: what was finished is kept in {out}; go on with --resume"
+    how = f"what was finished is kept in {out}; go on with --resume"
     with resumable(how), sweep_progress() as progress:
         run_sweep(request, out, resume, progress)
     from merge_cosim.experiments.store import MANIFEST, SUMMARY_JSON, ResultFolder

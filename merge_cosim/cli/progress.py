@@ -1,7 +1,10 @@
 """A progress bar on standard error, and what an interrupt says."""
 
+import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+from merge_cosim.errors import UserError
 
 
 @contextmanager
@@ -23,12 +26,16 @@ def sweep_progress() -> Iterator[Callable[[int, int, str], None]]:
 
 
 @contextmanager
-def resumable(message: str) -> Iterator[None]:
-    """On Ctrl-C say how to go on, and end with status 130."""
+def resumable(how: str) -> Iterator[None]:
+    """On Ctrl-C (which ends with status 130) and on a full disk say how to go on."""
     import typer
 
     try:
         yield
     except KeyboardInterrupt:
-        typer.echo(message, err=True)
+        typer.echo(f"interrupted: {how}", err=True)
         raise typer.Exit(130) from None
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        raise UserError(f"no space left on the disk; {how}") from None

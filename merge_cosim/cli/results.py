@@ -67,7 +67,7 @@ def reproduce(
     from merge_cosim.report.papers.page import write_reproduction
 
     found = find_data(data)
-    how = f"interrupted: what was finished is kept in {out}; the same command goes on"
+    how = f"what was finished is kept in {out}; the same command goes on"
     with resumable(how), sweep_progress() as progress:
         studies = run_studies(found, out, jobs or os.cpu_count() or 1, seed, progress)
         file = write_reproduction(studies, out, progress)

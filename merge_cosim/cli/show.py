@@ -34,7 +34,9 @@ def show_table(rows: Sequence[Mapping[str, Any]], title: str) -> None:
     columns = [name for name in (rows[0] if rows else {}) if any(row[name] not in (None, "") for row in rows)]
     table = Table(title=title or None, title_justify="left", header_style="bold")
     for name in columns:
-        table.add_column(name, justify="left" if any(isinstance(row[name], str) for row in rows) else "right")
+        table.add_column(
+            name, justify="left" if any(isinstance(row[name], str) for row in rows) else "right", overflow="fold"
+        )
     for row in rows:
         table.add_row(*(_text(row[name]) for name in columns))
     console = Console()

@@ -7,7 +7,7 @@ import signal
 import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import BaseContext
 from pathlib import Path
@@ -137,7 +137,8 @@ class _Worker:
         self.process: Any = context.Process(  # type: ignore[attr-defined]
             target=_serve, args=(there, inherited, plugins), name="merge-cosim worker", daemon=True
         )
-        self.process.start()
+        with _deaf():
+            self.process.start()
         there.close()
 
     def begin(self, piece: Piece | None) -> None:
@@ -155,6 +156,19 @@ class _Worker:
                 self.connection.send(None)
         self.connection.close()
         self.process.join()
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that begin here do not hear Ctrl-C, not even before `_serve` can say so."""
+    if threading.current_thread() is not threading.main_thread():  # only that one may say what a signal does
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import merge_cosim
-from merge_cosim.experiments.plan import SweepRequest
+from merge_cosim.experiments.plan import SweepRequest, method_names
 from merge_cosim.experiments.work import Task
 from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp, find_ramp
@@ -23,7 +23,8 @@ def identity(request: SweepRequest, tasks: Sequence[Task]) -> dict[str, Any]:
     return {
         "versions": software(),
         "seed": request.seed,
-        "methods": sorted({task.method.name for task in tasks}),
+        "methods": method_names(request, tasks),
+        "against": request.against,
         "settings": {key: str(value) for key, value in request.settings.items()},
         "variations": [[name, [str(value) for value in values]] for name, values in request.variations],
         "models": {name: digest(model.to_json().encode()) for name, model in models.items()},

@@ -66,7 +66,7 @@ def run(found: Sequence[Study], out: Path, say: Say | None = None) -> None:
             if say:
                 say(done, total, f"{lead}: {what}")
 
-        sweep(study.request, out / study.name, resume=True, progress=tell, reuse=True)
+        sweep(study.request, out / study.name, resume=True, progress=tell)
 
 
 def studies(data: Path | None, out: Path, jobs: int, seed: int, say: Say | None = None) -> list[Study]:

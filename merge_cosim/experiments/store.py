@@ -6,9 +6,10 @@ import csv
 import json
 import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -69,7 +70,7 @@ class ResultFolder:
                 raise UserError(
                     f"{self.path}: holds an interrupted sweep; add --resume to finish it, or choose another --out"
                 )
-            before = json.loads(self._plan.read_text(encoding="utf-8"))
+            before = _read_json(self._plan)
             changed = sorted(key for key in plan if plan[key] != before.get(key))
             if changed:
                 raise UserError(
@@ -87,8 +88,8 @@ class ResultFolder:
         return all(manifest.get(key) == value for key, value in json.loads(json.dumps(plan)).items())
 
     def done(self) -> set[str]:
-        """Names of the batches whose parts are there."""
-        return {file.stem for file in self._parts.glob("*.parquet")}
+        """Names of the batches whose parts are there, and can be read."""
+        return {file.stem for file in self._parts.glob("*.parquet") if _is_whole(file)}
 
     def add(self, name: str, rows: pa.Table) -> None:
         """Store one batch's rows; after this they survive anything."""
@@ -102,14 +103,15 @@ class ResultFolder:
         Args:
             more: Makes further rows from the rows of a stretch of cases, of which it gets all methods.
         """
-        unfinished = (self.path / RESULTS).with_suffix(".tmp")
-        with pq.ParquetWriter(unfinished, SCHEMA, compression="zstd") as writer:
+        with (
+            _replacing(self.path / RESULTS) as unfinished,
+            pq.ParquetWriter(unfinished, SCHEMA, compression="zstd") as writer,
+        ):
             for rows in self._stretches():
                 if more is not None:
                     rows = pa.concat_tables([rows, more(rows)])
                 rows = rows.sort_by(KEY).replace_schema_metadata(SCHEMA.metadata)
                 writer.write_table(rows, row_group_size=len(rows))
-        os.replace(unfinished, self.path / RESULTS)
 
     def _stretches(self) -> Iterator[pa.Table]:
         """All stored rows, scenario by scenario, in stretches of whole cases that follow each other by name."""
@@ -171,8 +173,12 @@ class ResultFolder:
         _write_table(self.path / TRACES, records)
 
     def traces(self) -> pa.Table:
-        """Read them: scenario, case, method and one row per cycle."""
-        return pq.read_table(self.path / TRACES)
+        """Read them: scenario, case, method and one row per cycle.
+
+        Raises:
+            UserError: They are missing or damaged.
+        """
+        return _read_table(self.path / TRACES)
 
     def write_json(self, name: str, document: Any) -> None:
         """Write one JSON file of the folder."""
@@ -188,16 +194,14 @@ class ResultFolder:
         """Read the rows of a finished sweep.
 
         Raises:
-            UserError: There are none, or another version wrote them.
+            UserError: There are none, a sweep into this folder is not finished, or another version wrote them.
         """
         file = self.path / RESULTS
+        if self._plan.is_file():  # what else is here may be of an earlier sweep
+            raise UserError(f"{self.path}: its sweep was interrupted, or is still running; finish it with --resume")
         if not file.is_file():
-            hint = "the sweep was interrupted; finish it with --resume" if self._plan.is_file() else "run a sweep first"
-            raise UserError(f"{file}: no results here; {hint}")
-        try:
-            rows = pq.read_table(file)
-        except pa.ArrowInvalid as error:
-            raise UserError(f"{file}: not a Parquet file ({error})") from None
+            raise UserError(f"{file}: no results here; run a sweep first")
+        rows = _read_table(file)
         version = (rows.schema.metadata or {}).get(b"merge_cosim_schema", b"none").decode()
         if version != SCHEMA_VERSION:
             raise UserError(f"{file}: result schema {version}, expected {SCHEMA_VERSION}; run the sweep again")
@@ -207,12 +211,9 @@ class ResultFolder:
         """Read one JSON file of the folder.
 
         Raises:
-            UserError: It is missing.
+            UserError: It is missing or damaged.
         """
-        file = self.path / name
-        if not file.is_file():
-            raise UserError(f"{file}: missing; run the sweep again")
-        return json.loads(file.read_text(encoding="utf-8"))
+        return _read_json(self.path / name)
 
 
 def with_scene_facts(rows: pa.Table, facts: list[dict[str, Any]]) -> pa.Table:
@@ -227,13 +228,47 @@ def _csv_rows(file: Path) -> list[dict[str, Any]]:
         return list(csv.DictReader(lines))
 
 
+def _is_whole(file: Path) -> bool:
+    try:
+        pq.read_metadata(file)
+    except (pa.ArrowInvalid, OSError):
+        return False
+    return True
+
+
+def _read_table(file: Path) -> pa.Table:
+    try:
+        return pq.read_table(file)
+    except FileNotFoundError:
+        raise UserError(f"{file}: missing; run the sweep again") from None
+    except (pa.ArrowInvalid, OSError) as error:
+        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
+
+
+def _read_json(file: Path) -> Any:
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError(f"{file}: missing; run the sweep again") from None
+    except ValueError as error:
+        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
+
+
 def _write_table(file: Path, rows: pa.Table) -> None:
-    unfinished = file.with_suffix(".tmp")
-    pq.write_table(rows, unfinished, compression="zstd")
-    os.replace(unfinished, file)
+    with _replacing(file) as unfinished:
+        pq.write_table(rows, unfinished, compression="zstd")
 
 
 def _write_text(file: Path, text: str) -> None:
-    unfinished = file.with_suffix(".tmp")
-    unfinished.write_text(text, encoding="utf-8")
-    os.replace(unfinished, file)
+    with _replacing(file) as unfinished:
+        unfinished.write(text.encode())
+
+
+@contextmanager
+def _replacing(file: Path) -> Iterator[BinaryIO]:
+    """A file to write to, which takes the name of `file` once all of it is on the disk."""
+    with file.with_suffix(".tmp").open("wb") as unfinished:
+        yield unfinished
+        unfinished.flush()
+        os.fsync(unfinished.fileno())
+    os.replace(unfinished.name, file)

@@ -49,17 +49,14 @@ class _Tally:
         self.by_method.setdefault(method, Effort()).add(effort)
 
 
-def sweep(
-    request: SweepRequest, out: Path, resume: bool = False, progress: Progress | None = None, reuse: bool = False
-) -> dict[str, Any]:
+def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Progress | None = None) -> dict[str, Any]:
     """Run a sweep and write its result folder; returns the manifest.
 
     Args:
         request: What to run.
         out: Result folder.
-        resume: Finish an interrupted sweep.
+        resume: Finish an interrupted sweep; a finished one is left as it is.
         progress: Told how far it is.
-        reuse: Leave a finished sweep of the same plan as it is.
 
     Raises:
         UserError: See `plan` and `ResultFolder.begin`.
@@ -68,7 +65,7 @@ def sweep(
     tasks = plan(request)
     folder = ResultFolder(out)
     what = identity(request, tasks)
-    if reuse and folder.holds(what):
+    if resume and folder.holds(what):
         manifest: dict[str, Any] = folder.read_json(MANIFEST)
         return manifest
     folder.begin(what, resume)

@@ -12,7 +12,7 @@ import pandas as pd
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.statistics.comparison import reference_of
 from merge_cosim.experiments.statistics.summary import ALL_SITES, GROUP, TRAFFIC, compare_all
-from merge_cosim.experiments.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, TRACES, ResultFolder
+from merge_cosim.experiments.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, ResultFolder
 from merge_cosim.report import case_figures, collisions, measure_tables, set_figures, tables
 from merge_cosim.report.columns import Table
 from merge_cosim.report.export import write_tables
@@ -65,8 +65,6 @@ def write_report(folder: Path, against: str | None = None) -> Path:
     manifest = store.read_json(MANIFEST)
     labels = [f"{name}={value}" for name, values in manifest["variations"] for value in values]
     summary = tables.summary_frame(_compared(store.read_json(SUMMARY_JSON), results, against), labels)
-    if not (folder / TRACES).is_file():
-        raise UserError(f"{folder / TRACES}: missing; run the sweep again")
     traces = store.traces().to_pandas()
     drawn = looks(results["method"])
     chapters = [_chapter(one, results, summary, traces, manifest, drawn) for one in tables.sections(summary)]
