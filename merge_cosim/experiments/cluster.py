@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,7 +15,7 @@ import pyarrow as pa
 
 from merge_cosim.cosim.loop import Effort
 from merge_cosim.errors import UserError
-from merge_cosim.experiments.executors import Finished
+from merge_cosim.experiments.executors import Finished, deaf
 from merge_cosim.experiments.identity import digest, digest_of, ramp_files, software
 from merge_cosim.experiments.pieces import Handout, Piece
 from merge_cosim.experiments.work import Task, Workplace
@@ -63,6 +64,8 @@ class Cluster:
         except ImportError:
             raise UserError("--dask: dask.distributed is not installed; pip install 'merge-cosim[dask]'") from None
         self._distributed: Any = distributed
+        for name in ("distributed", "distributed.client"):  # lost connections are told by us, in one line
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
     def run(self, handout: Handout) -> Iterator[Finished]:
         """See `Executor`."""
@@ -94,9 +97,14 @@ class Cluster:
     @contextmanager
     def _client(self) -> Iterator[Any]:
         if self._address == LOCAL:
-            cluster = self._distributed.LocalCluster(
-                n_workers=self._jobs, threads_per_worker=1, processes=True, dashboard_address=None
-            )
+            with deaf():
+                cluster = self._distributed.LocalCluster(
+                    n_workers=self._jobs,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                )
             with cluster, self._distributed.Client(cluster) as client:
                 yield client
             return
@@ -130,6 +138,10 @@ class Cluster:
             rows, effort = future.result()
         except self._distributed.scheduler.KilledWorker as error:
             raise UserError(f"{piece}: several workers died while running these cases ({error})") from None
+        except self._distributed.client.FutureCancelledError:
+            raise UserError(
+                f"--dask {self._address}: the scheduler was lost; what was finished is kept, go on with --resume"
+            ) from None
         return rows, effort
 
 

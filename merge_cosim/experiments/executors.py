@@ -8,6 +8,7 @@ import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import BaseContext
 from pathlib import Path
@@ -137,7 +138,7 @@ class _Worker:
         self.process: Any = context.Process(  # type: ignore[attr-defined]
             target=_serve, args=(there, inherited, plugins), name="merge-cosim worker", daemon=True
         )
-        with _deaf():
+        with deaf():
             self.process.start()
         there.close()
 
@@ -159,16 +160,17 @@ class _Worker:
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
-    """Processes that begin here do not hear Ctrl-C, not even before `_serve` can say so."""
-    if threading.current_thread() is not threading.main_thread():  # only that one may say what a signal does
+def deaf() -> Iterator[None]:
+    """Processes that begin here do not hear Ctrl-C: their employer decides what it means, and hears it afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    resource_tracker.ensure_running()  # would be started along with the first process, and make it hear again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:

@@ -68,7 +68,8 @@ class ResultFolder:
         if self._plan.is_file():
             if not resume:
                 raise UserError(
-                    f"{self.path}: holds an interrupted sweep; add --resume to finish it, or choose another --out"
+                    f"{self.path}: holds an unfinished sweep; if that runs no more, add --resume to finish it, or "
+                    f"choose another --out"
                 )
             before = _read_json(self._plan)
             changed = sorted(key for key in plan if plan[key] != before.get(key))
@@ -198,7 +199,7 @@ class ResultFolder:
         """
         file = self.path / RESULTS
         if self._plan.is_file():  # what else is here may be of an earlier sweep
-            raise UserError(f"{self.path}: its sweep was interrupted, or is still running; finish it with --resume")
+            raise UserError(f"{self.path}: holds an unfinished sweep; if that runs no more, finish it with --resume")
         if not file.is_file():
             raise UserError(f"{file}: no results here; run a sweep first")
         rows = _read_table(file)
