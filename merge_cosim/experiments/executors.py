@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import threading
+import traceback
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -187,6 +188,8 @@ def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Pa
             try:
                 outcome = task.run(workplace)
             except Exception as error:
+                if not isinstance(error, UserError):  # the traceback, say of a user's own file, stays behind
+                    error.add_note(f"In a worker process:\n{traceback.format_exc()}")
                 outcome = error
             employer.send(outcome)
     except (EOFError, OSError):  # the employer was killed

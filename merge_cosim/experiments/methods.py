@@ -25,6 +25,10 @@ CONSTANT = ("always-go", "always-yield")
 """The methods that `oracle-best` chooses from."""
 
 
+MOST_VALUES = 10_000
+"""Most values of one parameter: a slip in a step is not to fill the memory."""
+
+
 @dataclass(frozen=True)
 class Method:
     """A named pair of an estimator and a controller, with the parameters that were set.
@@ -168,8 +172,10 @@ def parse_variation(text: str) -> tuple[str, list[Any]]:
         count = steps_between(first, last, step)
     except (ValueError, ZeroDivisionError, OverflowError):
         count = -1
-    if count < 0:
-        raise UserError(f"--vary {text}: write NAME=A:B:STEP with A <= B, or NAME=X,Y,Z")
+    if not 0 <= count < MOST_VALUES:
+        raise UserError(
+            f"--vary {text}: write NAME=A:B:STEP with A <= B and fewer steps than {MOST_VALUES:,}, or X,Y,Z"
+        )
     whole = all(part == round(part) for part in (first, step))
     steps = [round(first + i * step, 9) for i in range(count + 1)]
     return name, [int(value) for value in steps] if whole else steps

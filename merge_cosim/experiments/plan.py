@@ -26,7 +26,7 @@ from merge_cosim.experiments.scenes import SceneBatch
 from merge_cosim.experiments.sources import SourceChoice, load_encounters
 from merge_cosim.experiments.statistics.comparison import reference_of
 from merge_cosim.experiments.statistics.summary import TRAFFIC
-from merge_cosim.experiments.work import Batch, Task
+from merge_cosim.experiments.work import FREE_LAW, Batch, Task
 from merge_cosim.intention.model import IntentionModel
 from merge_cosim.ramps.configuration import Configuration
 from merge_cosim.ramps.ramp import Ramp
@@ -97,6 +97,7 @@ def plan(request: SweepRequest) -> list[Task]:
             methods = _methods(request.methods, of_components)
             if varied in of_components:
                 methods = [one for one in methods if varied.partition(".")[0] in (one.estimator, one.controller)]
+            _refuse_unused(of_components, methods)
             for scenario in _scenarios(request.scenarios, of_scenario, varied):
                 if scenario.is_scene:
                     tasks += _scene_batches(scenario, label, methods, request)
@@ -153,6 +154,15 @@ def _methods(names: Sequence[str], settings: dict[str, Any]) -> list[Method]:
     if ORACLE_BEST in wanted:
         wanted = list(dict.fromkeys([*(name for name in wanted if name != ORACLE_BEST), *CONSTANT]))
     return [Method.parse(name, settings) for name in wanted]
+
+
+def _refuse_unused(settings: dict[str, Any], methods: Sequence[Method]) -> None:
+    """Refuse parameters of what no method consists of; those of acc are also in the law that delays are measured by."""
+    parts = {part for method in methods for part in (method.estimator, method.controller)}
+    for name in settings:
+        owner = name.partition(".")[0]
+        if owner not in parts and (owner != FREE_LAW or not methods):
+            raise UserError(f"{name}: no method of this sweep consists of '{owner}'; leave it out, or add --method")
 
 
 def _scene_batches(

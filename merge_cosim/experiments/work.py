@@ -35,6 +35,10 @@ PIECE_CASES = 1_000
 interrupted."""
 
 
+FREE_LAW = "acc"
+"""The controller whose free driving delays are measured against."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
     """Something of one scenario that is run under one method: `len` cases, which can be parted.
@@ -193,7 +197,7 @@ class Workplace:
 
 def free_law(method: Method) -> Acc:
     """The law whose free driving delays are measured against, with what was set of it."""
-    settings = {key.partition(".")[2]: value for key, value in method.settings if key.startswith("acc.")}
-    law = controllers.build("acc", settings, method.name)
+    settings = {key.partition(".")[2]: value for key, value in method.settings if key.startswith(f"{FREE_LAW}.")}
+    law = controllers.build(FREE_LAW, settings, method.name)
     assert isinstance(law, Acc)
     return law

@@ -12,6 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 from command import merge_cosim, small_scenario, summary
 
+from merge_cosim.errors import UserError
+from merge_cosim.experiments.store import ResultFolder
 from merge_cosim.files import shipped
 
 CONTRACT = [
@@ -105,7 +107,7 @@ def test_variations_and_settings(tmp_path):
     scenario = small_scenario(tmp_path)
     done = merge_cosim(
         *("sweep", scenario, "--method", "acc", "--method", "always-go", "--set", "test.horizon=2"),
-        *("--vary", "merging.ahead=clear,any", "--vary", "pgm.nodes=1:3:1", "--vary", "speed_limit=20:29:9"),
+        *("--vary", "merging.ahead=clear,any", "--vary", "pgm.nodes=1:3:1", "--vary", "speed_limit=20,29,20"),
         *("--method", "pgm", "--out", "out"),
         cwd=tmp_path,
     )
@@ -116,12 +118,13 @@ def test_variations_and_settings(tmp_path):
     assert ("speed_limit=20", "always-go") in seen
     assert ("pgm.nodes=2", "pgm") in seen
     assert ("pgm.nodes=2", "acc") not in seen  # it has no such parameter, so nothing would change
+    assert all(row["n"] == 75 for row in rows)  # also where a value is named twice
     by = {(row["variation"], row["method"]): row["failures"] for row in rows}
     assert by["merging.ahead=any", "acc"] <= by["merging.ahead=clear", "acc"]
 
 
-def interrupt(tmp_path, sent, *arguments):
-    """Start a sweep and send it, and its workers, a signal once rows are stored; returns its status and last words."""
+def interrupt(tmp_path, sent, *arguments, once="*.parquet"):
+    """Start a sweep and send it, and its workers, a signal once a part is there; returns its status and last words."""
     command = [sys.executable, "-m", "merge_cosim.cli.main", "sweep", *arguments]
     process = subprocess.Popen(
         [*command, "--out", "out", "--jobs", "2"],
@@ -134,7 +137,7 @@ def interrupt(tmp_path, sent, *arguments):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
     )
     deadline = time.monotonic() + 60
-    while not list(tmp_path.glob("out/parts/*.parquet")) and time.monotonic() < deadline:
+    while not list(tmp_path.glob(f"out/parts/{once}")) and time.monotonic() < deadline:
         time.sleep(0.02)
     os.killpg(process.pid, sent)
     _, error = process.communicate(timeout=60)
@@ -144,7 +147,8 @@ def interrupt(tmp_path, sent, *arguments):
 @pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
 def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent):
-    arguments = ("designed-random", "--set", "encounters.count=6000", "--method", "acc")
+    cases = ("designed-random", "--set", "encounters.count=3000")
+    arguments = (*cases, "--method", "acc", "--method", "slot-time")
     status, error = interrupt(tmp_path, sent, *arguments)
     assert status == (130 if sent == signal.SIGINT else -sent)
     assert ("--resume" in error) == (sent == signal.SIGINT)
@@ -154,15 +158,24 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent):
     if sent == signal.SIGKILL:
         refused_without_leave(tmp_path, arguments)
     assert {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")} == kept
-    resumed = merge_cosim("sweep", *arguments, "--out", "out", "--resume", cwd=tmp_path)
+    next(tmp_path.glob("out/parts/*.parquet")).write_bytes(b"")  # as after a fault of the disk
+    in_another_order = (*cases, "--method", "slot-time", "--method", "acc")
+    resumed = merge_cosim("sweep", *in_another_order, "--out", "out", "--resume", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
     unbroken = merge_cosim("sweep", *arguments, "--out", "whole", cwd=tmp_path)
     assert unbroken.returncode == 0
     assert (tmp_path / "out/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
 
 
+def test_an_interrupt_before_the_workers_are_ready_is_one_line(tmp_path):
+    status, error = interrupt(tmp_path, signal.SIGINT, "designed-random", "--method", "acc", once="plan.json")
+    assert (status, error) == (130, "interrupted: what was finished is kept in out; go on with --resume\n")
+
+
 def refused_without_leave(tmp_path, arguments):
-    """An interrupted sweep is neither overwritten nor mixed with another."""
+    """An interrupted sweep is neither overwritten nor mixed with another, nor shown."""
+    with pytest.raises(UserError, match="unfinished sweep"):
+        ResultFolder(tmp_path / "out").results()
     again = merge_cosim("sweep", *arguments, "--out", "out", cwd=tmp_path)
     assert again.returncode == 2
     assert "--resume" in again.stderr
@@ -171,7 +184,7 @@ def refused_without_leave(tmp_path, arguments):
     assert "scenarios, settings changed" in other.stderr
     plan = tmp_path / "out/parts/plan.json"
     held = json.loads(plan.read_text())
-    plan.write_text(json.dumps(held | {"versions": held["versions"] | {"libsumo": "1.0"}}))
+    plan.write_text(json.dumps(held | {"versions": held["versions"] | {"merge-cosim's source": "another"}}))
     other = merge_cosim("sweep", *arguments, "--out", "out", "--resume", cwd=tmp_path)
     assert other.returncode == 2
     assert "versions changed" in other.stderr
@@ -195,6 +208,8 @@ SLIPS = (
         (("sweep", "small.toml", "--method", "acc+foo"), "unknown controller 'foo'"),
         (("sweep", "small.toml", "--set", "acc.headwy=1"), "did you mean 'headway'"),
         (("sweep", "small.toml", "--set", "acc.headway=x"), "headway = 'x'"),
+        (("sweep", "small.toml", "--method", "acc", "--set", "lqr.headway=1"), "no method of this sweep consists of"),
+        (("sweep", "small.toml", "./small.toml"), "another scenario is called 'small', too"),
         (("sweep", "small.toml", "--set", "test.horizn=1"), "small.toml: unknown key 'test.horizn'"),
         (("sweep", "small.toml", "--set", "speed_limit=nan"), "speed_limit"),
         (("sweep", "small.toml", "--set", "ramp=nosuch"), "no ramp 'nosuch'"),

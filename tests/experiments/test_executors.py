@@ -108,8 +108,9 @@ class Faulty(Estimator):
 """
     )
     request = SweepRequest(["designed-random"], ["faulty"], settings=CASES, plugins=[plugin])
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(ZeroDivisionError) as raised:
         list(Processes(2, [plugin]).run(Handout(cut(plan(request), 60))))
+    assert f'File "{plugin}", line 11, in update' in raised.value.__notes__[0]
 
 
 def test_no_fork_beside_threads():
