@@ -119,6 +119,8 @@ def bench(
     command = (
         f"merge-cosim bench --cases {cases} --sample {sample} --rounds {rounds} --largest {largest} --copies {copies}"
     )
+    if jobs is not None:
+        command += f" --jobs {jobs}"
     if page is not None:
         figures.write_page(page, found, command)
     if json:
