@@ -41,7 +41,7 @@ def show_table(rows: Sequence[Mapping[str, Any]], title: str) -> None:
         table.add_row(*(_text(row[name]) for name in columns))
     console = Console()
     if not console.is_terminal:
-        console = Console(width=max(120, 14 * len(columns)))
+        console = Console(width=max(120, 16 * len(columns)))
     console.print(table)
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from merge_cosim.errors import UserError
 from merge_cosim.experiments.statistics.comparison import mcnemar
-from merge_cosim.experiments.statistics.summary import TRAFFIC
+from merge_cosim.experiments.statistics.summary import TRAFFIC, is_sample
 from merge_cosim.experiments.store import MANIFEST, ResultFolder
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order, is_reference
@@ -37,6 +37,8 @@ def compare(first: Path, second: Path) -> tuple[Table, list[str]]:
     frames = [folder.results().to_pandas() for folder in folders]
     paired = [frame[frame["source"] != TRAFFIC] for frame in frames]
     both = paired[0].merge(paired[1], on=[*GROUP, "case"], suffixes=("_a", "_b"))
+    same_start = np.isclose(both["ambiguity_s_a"], both["ambiguity_s_b"])  # other seeds draw cases of the same names
+    both = both[same_start]
     if both.empty:
         raise UserError(
             f"{first} and {second}: they have no case of the same scenario and method in common (meetings in living "
@@ -66,7 +68,8 @@ def _row(part: pd.DataFrame) -> dict[str, Any]:
     only_a, only_b = (int((one & ~other).sum()) for one, other in (failed, failed[::-1]))
     means = {f"{name}_{side}": part[f"{name}_{side}"].mean() for name in MEASURES for side in "ab"}
     rates = {f"failure_pct_{side}": 100 * f.mean() if len(f) else np.nan for side, f in zip("ab", failed, strict=True)}
-    return {"n": len(scored), **rates, "only_a": only_a, "only_b": only_b, "p": mcnemar(only_a, only_b), **means}
+    p = mcnemar(only_a, only_b) if is_sample(part) else None
+    return {"n": len(scored), **rates, "only_a": only_a, "only_b": only_b, "p": p, **means}
 
 
 def _differences(folders: list[ResultFolder], frames: list[pd.DataFrame]) -> list[str]:

@@ -19,7 +19,7 @@ def write_tables(folder: Path, tables: Mapping[str, Table]) -> list[Path]:
         tables: Tables by name.
     """
     target = folder / FOLDER
-    target.mkdir(exist_ok=True)
+    target.mkdir(parents=True, exist_ok=True)
     files = []
     for name, table in tables.items():
         stem = re.sub(r"[^\w.-]+", "-", name)

@@ -156,11 +156,11 @@ def test_the_studies_keep_sources_apart(tmp_path, data_dir):
 
 def test_two_folders_side_by_side(reproduced: Path, command: Callable[..., int], capsys, tmp_path):
     folders = (reproduced / "pairs-surrogate", reproduced / "nodes-surrogate")
-    assert command("compare", *folders, "--out", tmp_path) == 0
+    assert command("compare", *folders, "--out", tmp_path / "new") == 0
     printed = capsys.readouterr().out
     assert "pgm" in printed
     assert "only in" in printed
-    table = pd.read_csv(tmp_path / "tables" / "comparison.csv")
+    table = pd.read_csv(tmp_path / "new" / "tables" / "comparison.csv")
     assert (table["failure_pct_a"] == table["failure_pct_b"]).all()
     assert (table[["only_a", "only_b"]] == 0).all(axis=None)
     assert (table["p"] == 1.0).all()

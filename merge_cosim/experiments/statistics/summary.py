@@ -90,7 +90,7 @@ def compare_all(rows: pd.DataFrame, against: str | None) -> dict[tuple[str, ...]
         key = tuple(map(str, names))
         in_common = key[: len(SECTION)] if key[SECTION.index("source")] != TRAFFIC else ()
         other = others.get(in_common, frame.iloc[:0]).drop_duplicates("case")
-        found[key] = compare(group, other, against, _is_sample(group))
+        found[key] = compare(group, other, against, is_sample(group))
     return found
 
 
@@ -106,7 +106,7 @@ def _summaries(
     return pd.DataFrame(found)
 
 
-def _is_sample(group: pd.DataFrame) -> bool:
+def is_sample(group: pd.DataFrame) -> bool:
     """A fixed grid is no sample."""
     return bool((group["source"] != "designed").all())
 
@@ -117,7 +117,7 @@ def _summary(
     scored = group[~group["censored"]]
     failures, n = int(scored["failed"].sum()), len(scored)
     censored = len(group) - n
-    low, high = wilson(failures, n) if _is_sample(group) else (None, None)
+    low, high = wilson(failures, n) if is_sample(group) else (None, None)
     batch_us, single_us = cycle_us.get(key["method"], (None, None))
     own = scored[scored["failure_kind"] != "merging_into_host"]
     labelled = group[group["correct_at_merge"].notna()]
@@ -168,7 +168,7 @@ def _summary(
 def _intervals(group: pd.DataFrame) -> dict[str, Any]:
     """Bootstrap intervals over merging cars: of the failure rate where a car has several cases, and of D."""
     names = ("cluster_low_pct", "cluster_high_pct", "distance_low_m", "distance_high_m")
-    if not _is_sample(group):
+    if not is_sample(group):
         return {"cars": None, **dict.fromkeys(names)}
     logged = bool((group["car"] != "").all())
     clusters = group["car"] if logged else group["case"]
