@@ -15,6 +15,7 @@ from merge_cosim.experiments.executors import InProcess, Processes
 from merge_cosim.experiments.outcome import KEY
 from merge_cosim.experiments.pieces import Handout, cut
 from merge_cosim.experiments.plan import SweepRequest, plan
+from merge_cosim.intention.base import estimators
 
 CASES = {"encounters.count": 120}
 
@@ -66,7 +67,13 @@ def test_a_killed_worker_costs_its_piece_only(expected):
     assert found.equals(expected)
 
 
-def test_a_piece_that_kills_every_worker_ends_the_sweep_with_a_clear_line(tmp_path):
+@pytest.fixture
+def own_registry(monkeypatch):
+    """What a test registers is gone after it: no other test of this process is to run a deadly estimator."""
+    monkeypatch.setattr(estimators, "_classes", {name: estimators[name] for name in estimators.names()})
+
+
+def test_a_piece_that_kills_every_worker_ends_the_sweep_with_a_clear_line(tmp_path, own_registry):
     plugin = tmp_path / "deadly.py"
     plugin.write_text(
         """
@@ -91,7 +98,7 @@ class Deadly(Estimator):
         list(Processes(2, [plugin]).run(handout))
 
 
-def test_an_error_in_a_worker_is_raised_here(tmp_path):
+def test_an_error_in_a_worker_is_raised_here(tmp_path, own_registry):
     plugin = tmp_path / "faulty.py"
     plugin.write_text(
         """
