@@ -225,7 +225,7 @@ SLIPS = (
         (("sweep", "small.toml", "--vary", "acc.headway"), "--vary acc.headway: write NAME=A:B:STEP"),
         (("sweep", "small.toml", "--out", "small.toml"), "small.toml: is a file"),
         (("sweep", "small.toml", "--out", "small.toml/out"), "small.toml/out"),
-        (("sweep", "backwards.toml"), "backwards.toml: encounters.host_speed = "),
+        (("sweep", "backwards.toml"), "backwards.toml: encounters.host_speed: a speed must not be negative"),
         (("sweep", "kind.toml"), "kind.toml: encounters.kind = 'gird': there is no such kind"),
         (("sweep", "model.toml"), "model.toml: unknown merging car 'designd'; did you mean 'designed'"),
         (("sweep", "step.toml"), "unknown key 'encounters.host_offset.stp'; did you mean 'step'"),

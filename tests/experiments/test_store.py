@@ -43,9 +43,11 @@ def test_rows_are_in_order_and_cases_whole_whatever_a_stretch_is(tmp_path, monke
         return pa.Table.from_pandas(made, schema=SCHEMA, preserve_index=False)
 
     folder.merge(more)
+    groups, of_t = folder.groups(), folder.rows_of("t", "")
+    folder.finish()
     rows = folder.results()
     assert rows.num_rows == 2 * 3 * 15
     assert rows.equals(rows.sort_by(KEY))
     assert (len(stretches) > 2) == (rows_at_a_time < 15)
-    assert folder.groups() == [("s", ""), ("t", "")]
-    assert folder.rows_of("t", "").num_rows == 45
+    assert groups == [("s", ""), ("t", "")]
+    assert of_t.num_rows == 45
