@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import sumo
 import sumolib
-from command import merge_cosim
+from command import merge_cosim, refused
 
 from merge_cosim.experiments.plan import SweepRequest, plan
 from merge_cosim.ramps.ramp import Ramp
@@ -232,17 +232,14 @@ def test_a_window_writes_the_same(tmp_path):
 def test_mistakes_get_one_line_and_status_2(tmp_path, arguments, expected):
     (tmp_path / "file").touch()
     (tmp_path / "folder").mkdir()
-    done = merge_cosim("run", "designed-2", "--case", "d+1_h15_m14", "--method", "acc", *arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert expected in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+    case = ("run", "designed-2", "--case", "d+1_h15_m14", "--method", "acc")
+    assert expected in refused(*case, *arguments, cwd=tmp_path)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["file", "folder"]
 
 
 def test_the_logged_host_is_not_driven_in_sumo(tmp_path):
     case = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].encounters.case[0]
     arguments = ("--source", "surrogate", "--case", case, "--method", "human", "--fcd", "x.xml")
-    done = merge_cosim("run", "us101-replay", *arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith("merge-cosim: SUMO's outputs: the method 'human' is the log itself")
+    line = refused("run", "us101-replay", *arguments, cwd=tmp_path)
+    assert line.startswith("merge-cosim: SUMO's outputs: the method 'human' is the log itself")
     assert not (tmp_path / "x.xml").exists()
