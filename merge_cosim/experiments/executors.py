@@ -163,15 +163,20 @@ class _Worker:
 @contextmanager
 def deaf() -> Iterator[None]:
     """Processes that begin here do not hear Ctrl-C: their employer decides what it means, and hears it afterwards."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
+    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
+        yield  # Windows has no masks, and no other thread is interrupted
         return
+    heard: list[int] = []
     resource_tracker.ensure_running()  # would be started along with the first process, and make it hear again
+    handler = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))  # for threads without the mask
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+        if heard:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
