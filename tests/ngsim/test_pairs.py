@@ -15,7 +15,7 @@ MERGE = RAMP + [5] * 60
 
 
 def pairs(*cars: Car, **rules: object) -> Paired:
-    return extract_pairs(table(*cars), US101, PairRules(**rules), "ngsim")  # type: ignore[arg-type]
+    return extract_pairs(table(*cars), US101, PairRules(**rules), "ngsim")
 
 
 def test_a_merge_between_two_hosts() -> None:

@@ -21,4 +21,4 @@ def test_seconds_to_cycles() -> None:
 )
 def test_impossible_rules_are_refused(change: dict[str, object], named: str) -> None:
     with pytest.raises(UserError, match=named):
-        PairRules(**change)  # type: ignore[arg-type]
+        PairRules(**change)

@@ -29,7 +29,7 @@ class Car:
 def steady(vehicle: int, lanes: list[int], at: float, speed: float = 15.0, frame: int = 0, **more: object) -> Car:
     """A car at `at` [m] past the gore in frame 0 of the recording's clock."""
     position = at + speed * 0.1 * (frame + np.arange(len(lanes)))
-    return Car(vehicle, lanes, position, frame, speed=np.full(len(lanes), speed), **more)  # type: ignore[arg-type]
+    return Car(vehicle, lanes, position, frame, speed=np.full(len(lanes), speed), **more)
 
 
 def table(*cars: Car) -> pa.Table:

@@ -68,7 +68,7 @@ def test_station_is_the_inverse_of_place(name: str, path: str, station: float, s
     merge_position = share * (ramp.auxiliary_end if ramp.changes_lane else 0.0)
     if station + merge_position > ramp.downstream:
         return
-    place = ramp.place(path, station, merge_position)  # type: ignore[arg-type]
+    place = ramp.place(path, station, merge_position)
     assert ramp.station(*place, merge_position) == pytest.approx(station, abs=1e-9)
     if path == "main" or station >= 0.0:
         assert place.lane == ramp.host_lane_on(place.edge)

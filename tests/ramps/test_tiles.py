@@ -49,7 +49,7 @@ def drive(ramp: Ramp, tile: str, seed: int, cycles: int = 250) -> float:
     speed = {car: float(rng.uniform(0.0, 28.0)) for car in CARS}
     start, odometer = dict(station), {}
     for car, path in zip(CARS, ("main", "ramp"), strict=True):
-        where = ramp.place(path, station[car], merge_position)  # type: ignore[arg-type]
+        where = ramp.place(path, station[car], merge_position)
         libsumo.vehicle.moveTo(car, f"{tile}{where.edge}_{where.lane}", where.position)
         libsumo.vehicle.setPreviousSpeed(car, speed[car])
         odometer[car] = libsumo.vehicle.getDistance(car)
