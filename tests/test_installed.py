@@ -37,7 +37,7 @@ def test_nets_and_scenarios_are_found_from_a_wheel(tmp_path):
     assert {row["scenario"] for row in listed("scenarios")} == shipped
     nets = {file.parent.name for file in (ROOT / "sumo_nets").glob("*/ramp.toml")}
     assert {row["name"] for row in listed("ramp", "list")} == nets
-    probe = "import merge_cosim, merge_cosim.files as f; print(merge_cosim.__file__, *map(f.shipped, "
+    probe = "import merge_cosim, merge_cosim.core.files as f; print(merge_cosim.__file__, *map(f.shipped, "
     probe += "('sumo_nets', 'tools/bench')))"
     done = subprocess.run(
         [sys.executable, "-c", probe],

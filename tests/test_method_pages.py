@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from merge_cosim.control.base import controllers
-from merge_cosim.intention.base import estimators
-from merge_cosim.registry import meanings
-from merge_cosim.traffic.base import merging_cars
+from merge_cosim.controllers.base import controllers
+from merge_cosim.core.registry import meanings
+from merge_cosim.estimators.base import estimators
+from merge_cosim.merging_cars.base import merging_cars
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted((ROOT / "docs" / "methods").glob("*.md"))

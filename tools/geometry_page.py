@@ -18,9 +18,9 @@ from geometry.sites import DRAWN, TIES
 from matplotlib.axes import Axes
 from ramp_geometry import NETS, fitted, plan_of
 
+from merge_cosim.core.units import FOOT
 from merge_cosim.ramps.definition import read_ramp_file
 from merge_cosim.ramps.ramp import Ramp, read_net
-from merge_cosim.units import FOOT
 
 DOCS = Path(__file__).parent.parent / "docs"
 TITLES = {"us101": "US-101", "i80": "I-80"}

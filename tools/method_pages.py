@@ -13,10 +13,10 @@ from pathlib import Path
 
 from blocks import filled, table
 
-from merge_cosim.control.base import controllers
-from merge_cosim.intention.base import estimators
-from merge_cosim.registry import Registry, meanings
-from merge_cosim.registry import parameters as defaults
+from merge_cosim.controllers.base import controllers
+from merge_cosim.core.registry import Registry, meanings
+from merge_cosim.core.registry import parameters as defaults
+from merge_cosim.estimators.base import estimators
 
 DOCS = Path(__file__).parent.parent / "docs"
 MODEL = "us101-ngsim"
@@ -36,8 +36,8 @@ def densities(argument: str, data: Path | None = None) -> str | None:
     """Losses of the densities on held-out cars; `argument` is the source."""
     if argument == "ngsim" and data is None:
         return None
-    from merge_cosim.experiments.judging import DENSITIES
-    from merge_cosim.experiments.training import train
+    from merge_cosim.studies.judging import DENSITIES
+    from merge_cosim.studies.training import train
 
     with tempfile.TemporaryDirectory() as folder:
         report = train("us101", data, argument, "car", 0, Path(folder) / "model.json")
@@ -58,7 +58,7 @@ def densities(argument: str, data: Path | None = None) -> str | None:
 
 def draw() -> None:
     """Draw what the shipped model learned, and what the estimators believe."""
-    from merge_cosim.intention.model import IntentionModel
+    from merge_cosim.estimators.learned.model import IntentionModel
     from merge_cosim.report import belief_figures, canvas, model_figures
 
     model = IntentionModel.load(MODEL)

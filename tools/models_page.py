@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from merge_cosim.encounter import Encounters, Intention
-from merge_cosim.errors import UserError
-from merge_cosim.experiments.encounter_sources import Pairs
-from merge_cosim.experiments.sources import SourceChoice, pairs_of_site
-from merge_cosim.experiments.training import train
-from merge_cosim.intention.model import MODELS, IntentionModel
+from merge_cosim.core.encounter import Encounters, Intention
+from merge_cosim.core.errors import UserError
+from merge_cosim.estimators.learned.model import MODELS, IntentionModel
+from merge_cosim.scenarios.encounters import SourceChoice, pairs_of_site
+from merge_cosim.scenarios.sources import Pairs
+from merge_cosim.studies.training import train
 
 PAGE = Path(__file__).parent.parent / "docs" / "models.md"
 SPEAKS_FOR = {"YIELD": Intention.YIELD, "NOT_YIELD": Intention.NOT_YIELD}
@@ -30,7 +30,8 @@ HEAD = """\
 
 What `pgm` and its kin learn from data: how speeds go on, the two times to arrival, and how often drivers yield, each
 for the merging cars that yield and those that do not. A model is one readable JSON file of counts in
-[merge_cosim/intention/models/](../merge_cosim/intention/models), with the keys of the merging cars it was trained on; a
+[estimators/learned/models/](../merge_cosim/estimators/learned/models), with the keys of the merging cars it was
+trained on; a
 sweep refuses to test it on these. A sweep takes the model of its data: `us101-ngsim` on real data and on the designed
 grid, `us101-surrogate` on surrogate data; `--model FILE` takes another.
 

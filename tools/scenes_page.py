@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 from blocks import filled, table
 
-from merge_cosim.experiments.full_scenes import SceneReplay
-from merge_cosim.experiments.plan import SweepRequest, plan
-from merge_cosim.experiments.store import SCENES_CSV, ResultFolder
-from merge_cosim.experiments.sweep import sweep
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.results.store import SCENES_CSV, ResultFolder
+from merge_cosim.sweeps.full_scene_task import SceneReplay
+from merge_cosim.sweeps.plan import SweepRequest, plan
+from merge_cosim.sweeps.sweep import sweep
 
 PAGE = Path(__file__).parent.parent / "docs" / "scenes.md"
 METHODS = ("acc", "slot", "pgm", "fg", "ipcb", "always-go", "always-yield")
@@ -98,13 +98,13 @@ def replay(data: Path) -> SceneReplay:
 
 def starts(batch: SceneReplay) -> str:
     """Time gaps of the hosts to their leaders at the start."""
-    plant = batch.open(Ramp.load(batch.scenario.ramp))
+    world = batch.open(Ramp.load(batch.scenario.ramp))
     found: dict[str, list[float]] = {"fragments": [], "episodes": []}
     for number in range(len(batch)):
-        plant.place(np.array([0]), batch.encounters, np.array([number]))
-        gap = plant.neighbours.leader_gap / float(plant.state[2, 0])
+        world.place(np.array([0]), batch.encounters, np.array([number]))
+        gap = world.neighbours.leader_gap / float(world.state[2, 0])
         found[kind(batch.case(number))].append(gap)
-    plant.close()
+    world.close()
     lines = []
     for name, gaps in found.items():
         led = np.array([gap for gap in gaps if np.isfinite(gap)])

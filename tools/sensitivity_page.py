@@ -17,11 +17,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from merge_cosim.control.base import controllers
-from merge_cosim.experiments.methods import parse_value
-from merge_cosim.experiments.scenario import load_scenario
+from merge_cosim.controllers.base import controllers
+from merge_cosim.core.registry import parameters
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.registry import parameters
+from merge_cosim.scenarios.methods import parse_value
+from merge_cosim.scenarios.scenario import load_scenario
 
 METHODS = ("acc", "slot", "slot-time", "pgm", "always-go", "always-yield")
 RIVALS = ("acc", "slot", "slot-time", "pgm")

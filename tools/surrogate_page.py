@@ -12,14 +12,14 @@ import numpy as np
 from scipy.stats import ks_2samp
 from sklearn.metrics import roc_auc_score
 
-from merge_cosim.encounter import Encounters, Intention
-from merge_cosim.ngsim.encounters import site_pairs
-from merge_cosim.ngsim.pairs import Paired
+from merge_cosim.core.encounter import Encounters, Intention
+from merge_cosim.core.units import DT, FloatArray, time_to_arrival
+from merge_cosim.ngsim.pairing.encounters import site_pairs
+from merge_cosim.ngsim.pairing.pairs import Paired
+from merge_cosim.ngsim.pairing.summary import summarise
 from merge_cosim.ngsim.sites import SITES
-from merge_cosim.ngsim.summary import summarise
-from merge_cosim.traffic.recipe import RECIPES
-from merge_cosim.traffic.surrogate import surrogate_folder
-from merge_cosim.units import DT, FloatArray, time_to_arrival
+from merge_cosim.ngsim.surrogate.recipe import RECIPES
+from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 
 DOCS = Path(__file__).parent.parent / "docs"
 BANDS = ((0, 40), (40, 70), (70, 110), (110, np.inf))
@@ -183,9 +183,9 @@ about drivers.
 
 {minutes:.0f} minutes of traffic per site, in {recordings} recordings with a seed each: with one version of SUMO the
 same bytes every time. All drivers use SUMO's car-following model EIDM with its lane-change model LC2013; the on-ramp's
-cars come at even intervals, the others at random ones. The recipe (`merge_cosim/traffic/recipe.py`) was set by hand so
-that pairs, way to the lane change, speeds and the share of yielding come near the published figures (Dong, Dolan,
-Litkouhi 2017, Table I) and, on US-101, near the real pairs; no method was run on it.
+cars come at even intervals, the others at random ones. The recipe (`merge_cosim/ngsim/surrogate/recipe.py`) was set
+by hand so that pairs, way to the lane change, speeds and the share of yielding come near the published figures (Dong,
+Dolan, Litkouhi 2017, Table I) and, on US-101, near the real pairs; no method was run on it.
 
 Made by `python tools/surrogate_page.py --data DIR` with the NGSIM files in `DIR`. 'Real' is what that folder held:
 {held}.

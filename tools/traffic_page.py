@@ -16,8 +16,8 @@ from pathlib import Path
 import pandas as pd
 from blocks import filled, table
 
-from merge_cosim.experiments.statistics.rates import wilson
 from merge_cosim.report.methods import in_order
+from merge_cosim.results.statistics.rates import wilson
 
 SCENARIOS = ("traffic-light", "traffic-dense", "traffic-stop-and-go")
 METHODS = ("acc", "slot", "slot-time", "pgm", "pgm-time", "fg-time", "ipcb", "ipcb+acc", "dbn-pf")

@@ -15,7 +15,7 @@ from merge_cosim.bench.scenes import METHOD as SCENE_METHOD
 from merge_cosim.bench.scenes import SCENARIO as SCENE_SCENARIO
 from merge_cosim.bench.scenes import scene_costs
 from merge_cosim.bench.updates import estimator_costs
-from merge_cosim.experiments.identity import versions
+from merge_cosim.sweeps.identity import versions
 
 HEAD = """# Bench
 

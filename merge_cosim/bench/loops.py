@@ -17,15 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from merge_cosim.control.acc import Acc
-from merge_cosim.control.law import DistanceKeeping
-from merge_cosim.cosim.loop import Effort
-from merge_cosim.encounter import Encounters
-from merge_cosim.errors import UserError
-from merge_cosim.experiments.plan import SweepRequest, plan_encounters
-from merge_cosim.experiments.work import Batch, Workplace
-from merge_cosim.files import shipped
+from merge_cosim.controllers.acc import Acc
+from merge_cosim.controllers.law import DistanceKeeping
+from merge_cosim.core.encounter import Encounters
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import shipped
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.simulation.loop import Effort
+from merge_cosim.sweeps.plan import SweepRequest, plan_encounters
+from merge_cosim.sweeps.task import Batch, WorkerSession
 
 SCENARIO, METHOD = "designed-2", "acc"
 """What is run: the laws of this scenario and method are the ones that the alternatives spell out."""
@@ -61,10 +61,10 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "task.json"
         file.write_text(json.dumps(_task(batch, ramp, batch.encounters.take(chosen))), encoding="utf-8")
-        workplace = Workplace()
-        batch.simulate(workplace.plant(ramp, len(batch.encounters), 0), ramp)  # to warm up
+        worker_session = WorkerSession()
+        batch.simulate(worker_session.world(ramp, len(batch.encounters), 0), ramp)  # to warm up
         for _ in range(rounds):
-            run = batch.simulate(workplace.plant(ramp, len(batch.encounters), 0), ramp)
+            run = batch.simulate(worker_session.world(ramp, len(batch.encounters), 0), ramp)
             efforts.append(run.effort)
             ours = tuple((run.columns["kind"][chosen] > 0).tolist())
             for name, script in ALTERNATIVES.items():
@@ -72,7 +72,7 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
                 if timing.failed != ours:
                     raise UserError(f"bench: {script} finds other failures than ours; its time does not compare")
                 timings[name].append(timing)
-        workplace.close()
+        worker_session.close()
     own = median(1e6 * effort.wall_s / effort.vehicle_steps for effort in efforts)
     theirs = {name: median(one.us_per_vehicle_step for one in each) for name, each in timings.items()}
     return {

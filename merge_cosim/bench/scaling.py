@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from merge_cosim.errors import UserError
-from merge_cosim.experiments.store import MANIFEST
+from merge_cosim.core.errors import UserError
+from merge_cosim.results.store import MANIFEST
 
 SCENARIO, METHOD = "designed-random", "acc"
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from merge_cosim.experiments.plan import SweepRequest, plan
-from merge_cosim.experiments.scenes import SceneBatch
+from merge_cosim.sweeps.plan import SweepRequest, plan
+from merge_cosim.sweeps.scene_task import SceneBatch
 
 SCENARIO, METHOD = "traffic-dense", "pgm"
 MODELS = ("Krauss", "IDM", "EIDM")

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from merge_cosim.encounter import Intention
-from merge_cosim.experiments.plan import default_model
-from merge_cosim.experiments.work import TILES
-from merge_cosim.intention.base import Estimator, estimators
-from merge_cosim.intention.model import IntentionModel
-from merge_cosim.observation import Observation, Setting
-from merge_cosim.streams import stream_keys
-from merge_cosim.units import DT
+from merge_cosim.core.encounter import Intention
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.random_streams import stream_keys
+from merge_cosim.core.units import DT
+from merge_cosim.estimators.base import Estimator, estimators
+from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.sweeps.plan import default_model
+from merge_cosim.sweeps.task import TILES
 
 CYCLES = 60
 """Cycles of each timed run: six seconds of an approach."""

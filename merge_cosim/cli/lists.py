@@ -13,7 +13,7 @@ app = typer.Typer()
 @app.command()
 def methods(plugin: Plugins = None, json: Json = False) -> None:
     """List estimators, controllers and merging cars with their parameters."""
-    from merge_cosim.experiments.catalogue import components
+    from merge_cosim.scenarios.catalogue import components
 
     rows = components(plugin or ())
     if json:
@@ -27,7 +27,7 @@ def methods(plugin: Plugins = None, json: Json = False) -> None:
 @app.command()
 def scenarios(json: Json = False) -> None:
     """List the shipped scenarios."""
-    from merge_cosim.experiments.scenario import load_scenario, scenario_names
+    from merge_cosim.scenarios.scenario import load_scenario, scenario_names
 
     rows = [load_scenario(name) for name in scenario_names()]
     listed = [{"scenario": one.name, "title": one.title, "ramp": one.ramp, "about": one.about.strip()} for one in rows]
@@ -42,7 +42,7 @@ def cache(clear: Annotated[bool, typer.Option("--clear", help="Delete it.")] = F
     """Show what is kept of generated data, and where."""
     import shutil
 
-    from merge_cosim.files import cache_folder
+    from merge_cosim.core.files import cache_folder
 
     folder = cache_folder()
     rows = []

@@ -10,7 +10,7 @@ import typer
 from merge_cosim.cli import lists, ngsim, ramp, results
 from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Model, Plugins, Seed, Sets
 from merge_cosim.cli.show import die, print_json, show_table
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 
 app = typer.Typer(
     help=__import__("merge_cosim").__doc__,
@@ -68,10 +68,10 @@ def sweep(
     import os
 
     from merge_cosim.cli.progress import resumable, sweep_progress
-    from merge_cosim.experiments.methods import parse_setting, parse_variation
-    from merge_cosim.experiments.plan import SweepRequest
-    from merge_cosim.experiments.sweep import sweep as run_sweep
     from merge_cosim.ngsim.data import find_data
+    from merge_cosim.scenarios.methods import parse_setting, parse_variation
+    from merge_cosim.sweeps.plan import SweepRequest
+    from merge_cosim.sweeps.sweep import sweep as run_sweep
 
     request = SweepRequest(
         scenarios=scenarios,
@@ -91,7 +91,7 @@ def sweep(
     how = f"what was finished is kept in {out}; go on with --resume"
     with resumable(how), sweep_progress() as progress:
         run_sweep(request, out, resume, progress)
-    from merge_cosim.experiments.store import MANIFEST, SUMMARY_JSON, ResultFolder
+    from merge_cosim.results.store import MANIFEST, SUMMARY_JSON, ResultFolder
 
     folder = ResultFolder(out)
     if json:
@@ -102,7 +102,7 @@ def sweep(
         if traffic := folder.traffic():
             shown = [name for name in SHOWN_TRAFFIC if name in traffic[0]]
             show_table([{name: row[name] for name in shown} for row in traffic], "the traffic as a whole")
-    for line in folder.told():
+    for line in folder.note_lines():
         typer.echo(line, err=True)
 
 
@@ -131,12 +131,12 @@ def run(
     json: Json = False,
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
-    from merge_cosim.cosim.attached import Address
-    from merge_cosim.cosim.outputs import SumoOutputs
-    from merge_cosim.experiments.methods import parse_setting
-    from merge_cosim.experiments.plan import SweepRequest
-    from merge_cosim.experiments.single import run_single
     from merge_cosim.ngsim.data import find_data
+    from merge_cosim.scenarios.methods import parse_setting
+    from merge_cosim.sumo.attach import Address
+    from merge_cosim.sumo.outputs import SumoOutputs
+    from merge_cosim.sweeps.plan import SweepRequest
+    from merge_cosim.sweeps.single import run_single
 
     request = SweepRequest(
         scenarios=[scenario],
@@ -178,10 +178,10 @@ def export(
 
     With --commonroad: run the case and write it as a CommonRoad scenario, with the host as its planning problem.
     """
-    from merge_cosim.experiments.methods import parse_setting
-    from merge_cosim.experiments.plan import SweepRequest
-    from merge_cosim.experiments.single import export_case, export_commonroad
     from merge_cosim.ngsim.data import find_data
+    from merge_cosim.scenarios.methods import parse_setting
+    from merge_cosim.sweeps.plan import SweepRequest
+    from merge_cosim.sweeps.single import export_case, export_commonroad
 
     if method and not commonroad:
         raise UserError("--method: only with --commonroad; the SUMO files of a case are the same under all methods")
@@ -212,8 +212,8 @@ def train(
     json: Json = False,
 ) -> None:
     """Learn speed transitions, times to arrival and the prior from one third of a site's pairs, and judge the rest."""
-    from merge_cosim.experiments.training import train as train_model
     from merge_cosim.ngsim.data import find_data
+    from merge_cosim.studies.training import train as train_model
 
     report = train_model(site, find_data(data), source, split, seed, out)
     if json:

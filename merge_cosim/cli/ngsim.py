@@ -87,7 +87,7 @@ def summary(
     from rich.console import Console
     from rich.table import Column, Table
 
-    from merge_cosim.ngsim.summary import summarise_folder
+    from merge_cosim.ngsim.pairing.summary import summarise_folder
 
     summaries = summarise_folder(data)
     if as_json:
@@ -134,7 +134,7 @@ def surrogate(
 
     from merge_cosim.ngsim.sites import SITES
     from merge_cosim.ngsim.sites import site as find_site
-    from merge_cosim.traffic.surrogate import export
+    from merge_cosim.ngsim.surrogate.surrogate import export
 
     files = {each.name: export(each, out) for each in ([find_site(site)] if site else SITES)}
     written = [

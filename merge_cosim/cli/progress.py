@@ -4,7 +4,7 @@ import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 
 
 @contextmanager

@@ -109,7 +109,7 @@ def new(
     as_json: Json = False,
 ) -> None:
     """Start a ramp of your own: from a few numbers, a SUMO net, or an extract of OpenStreetMap."""
-    from merge_cosim.ramps.start import start_ramp
+    from merge_cosim.ramps.create.start import start_ramp
 
     numbers = {
         "lanes": lanes,
@@ -138,8 +138,8 @@ def describe(
     as_json: Json = False,
 ) -> None:
     """Write a ramp.toml beside a net of your own, so that its configurations run; the net is left as it is."""
-    from merge_cosim.ramps.describe import describe_ramp
-    from merge_cosim.ramps.start import found
+    from merge_cosim.ramps.create.describe import describe_ramp
+    from merge_cosim.ramps.create.start import found
 
     folder = describe_ramp(net, link, speed_limit)
     _print_found(folder, f"wrote {folder / 'ramp.toml'}", found(folder), as_json)

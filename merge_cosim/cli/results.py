@@ -62,9 +62,9 @@ def reproduce(
     import os
 
     from merge_cosim.cli.progress import resumable, sweep_progress
-    from merge_cosim.experiments.reproduction import reproduce as run_studies
     from merge_cosim.ngsim.data import find_data
-    from merge_cosim.report.papers.page import write_reproduction
+    from merge_cosim.studies.papers.page import write_reproduction
+    from merge_cosim.studies.reproduction import reproduce as run_studies
 
     found = find_data(data)
     how = f"what was finished is kept in {out}; the same command goes on"
@@ -87,9 +87,9 @@ def bounds(
     json: Json = False,
 ) -> None:
     """Count the cases of a replay that no host could pass without a failure, or not without a long delay."""
-    from merge_cosim.experiments.bounds import bounds_of
-    from merge_cosim.experiments.methods import parse_setting
     from merge_cosim.ngsim.data import find_data
+    from merge_cosim.scenarios.methods import parse_setting
+    from merge_cosim.studies.bounds import bounds_of
 
     cases, rows = bounds_of(scenario, dict(map(parse_setting, set_ or ())), find_data(data), source)
     if out is not None:

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.formats import Source, open_text
 
 BLOCK_BYTES = 1 << 24

@@ -6,9 +6,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.ngsim.formats import Source
-from merge_cosim.units import BoolArray, FloatArray, IntArray
 
 LIMITS = {
     "vehicle_id": (-1e8, 1e8),

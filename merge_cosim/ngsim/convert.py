@@ -8,7 +8,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.read import merge, read_file
 from merge_cosim.ngsim.sites import Site
 from merge_cosim.ngsim.table import Repeats

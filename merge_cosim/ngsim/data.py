@@ -13,8 +13,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from merge_cosim.errors import UserError
-from merge_cosim.files import cache_folder
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import cache_folder
 from merge_cosim.ngsim.download import UNFINISHED
 from merge_cosim.ngsim.formats import Kind, sources
 from merge_cosim.ngsim.read import Reading, merge, read_file

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from urllib.parse import urlsplit
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.formats import Kind, sources
 
 PORTAL = "https://data.transportation.gov/api/views/8ect-6jqj/rows.csv?accessType=DOWNLOAD"

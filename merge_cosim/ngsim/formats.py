@@ -14,8 +14,8 @@ from typing import BinaryIO, cast
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from merge_cosim.errors import UserError
-from merge_cosim.units import FOOT
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import FOOT
 
 TEXT_COLUMNS = (
     "Vehicle_ID",

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.blocks import map_blocks
 from merge_cosim.ngsim.formats import Kind, Source, sources
 from merge_cosim.ngsim.rows import Piece, convert, needed_columns

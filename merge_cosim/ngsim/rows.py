@@ -7,12 +7,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.ngsim.clean import OPTIONAL, Place, checked, numbers
 from merge_cosim.ngsim.formats import Source, missing_columns
 from merge_cosim.ngsim.sites import SITES, Site
 from merge_cosim.ngsim.table import SCHEMA
-from merge_cosim.units import FloatArray, IntArray
 
 CLOCK = "Global_Time"
 """The column [ms since 1970] that tells the recordings apart where the file does not name them."""

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from merge_cosim.errors import UserError
-from merge_cosim.units import FOOT
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import FOOT
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pyarrow as pa
 
-from merge_cosim.units import BoolArray, IntArray
+from merge_cosim.core.units import BoolArray, IntArray
 
 _NAME = pa.dictionary(pa.int32(), pa.string())
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import sumolib
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.definition import read_ramp_file
 
 HEAD = re.compile(rb"\A(<\?xml[^>]*\?>)\s*<!--.*?-->\s*", re.DOTALL)

@@ -8,7 +8,7 @@ from typing import Any
 
 import sumolib
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.build import built, config
 from merge_cosim.ramps.definition import FILE_NAME, RampFile, read_ramp_file
 from merge_cosim.ramps.infer import MAX_TURN, turn

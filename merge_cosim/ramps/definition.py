@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError, model_validator
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 
 FILE_NAME = "ramp.toml"
 

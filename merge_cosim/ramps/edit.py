@@ -11,7 +11,7 @@ from pathlib import Path
 
 import sumolib
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.build import HEAD, config, netconvert
 from merge_cosim.ramps.definition import read_ramp_file
 from merge_cosim.ramps.view import netedit_view

@@ -9,7 +9,7 @@ from typing import Any
 
 import sumolib
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 
 Edge = Any
 Lane = Any

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from merge_cosim.units import FloatArray
+from merge_cosim.core.units import FloatArray
 
 MIN_SPACING = 0.5
 """Points nearer than this to the one before are left out [m]; their direction would be rounding."""

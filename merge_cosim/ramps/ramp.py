@@ -15,10 +15,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 import sumolib
 
-from merge_cosim.errors import UserError
-from merge_cosim.files import shipped
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import shipped
+from merge_cosim.core.units import BoolArray, FloatArray
 from merge_cosim.ramps.definition import FILE_NAME, NgsimMapping, RampFile, read_ramp_file
-from merge_cosim.units import BoolArray, FloatArray
 
 Way = Literal["main", "ramp"]
 """The host's path and the merging car's."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from merge_cosim.observation import Observation
-from merge_cosim.units import DT, FloatArray
+from merge_cosim.core.observation import Observation
+from merge_cosim.core.units import DT, FloatArray
 
 DURATION = 12.0
 """Length of the two approaches of the DBN-PF blog post [s]."""
@@ -40,7 +40,7 @@ def behind_but_accelerating(
     """
     back = np.arange(cycles - 1, -1, -1, dtype=np.float64) * DT
     speed = merging[1] - acceleration * back
-    # Euler as the plant: the way from a cycle to the last is the sum of the later speeds
+    # Euler as the world: the way from a cycle to the last is the sum of the later speeds
     way = np.concatenate([np.cumsum(speed[:0:-1])[::-1] * DT, [0.0]])
     return _sequence(host[0] - host[1] * back, np.full(cycles, host[1]), merging[0] - way, speed)
 

@@ -8,20 +8,20 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from merge_cosim.control.acc import Acc
-from merge_cosim.control.pcb import Pcb
-from merge_cosim.encounter import Intention
-from merge_cosim.intention.base import Estimator
-from merge_cosim.intention.dbn_pf import DbnPf, Maneuver, Step
-from merge_cosim.intention.ipcb import Ipcb
-from merge_cosim.intention.model import IntentionModel
-from merge_cosim.intention.pgm import Pgm
-from merge_cosim.observation import Observation, Setting
+from merge_cosim.controllers.acc import Acc
+from merge_cosim.controllers.pcb import Pcb
+from merge_cosim.core.encounter import Intention
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.random_streams import stream_keys
+from merge_cosim.core.units import DT
+from merge_cosim.estimators.base import Estimator
+from merge_cosim.estimators.dbn_pf import DbnPf, Maneuver, Step
+from merge_cosim.estimators.ipcb import Ipcb
+from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.estimators.pgm import Pgm
 from merge_cosim.report import canvas
 from merge_cosim.report.belief_cases import behind_but_accelerating, pulls_ahead, stays_behind
 from merge_cosim.report.methods import COLORS as METHOD_COLORS
-from merge_cosim.streams import stream_keys
-from merge_cosim.units import DT
 
 COLORS = {Maneuver.YIELD: "#c1121f", Maneuver.NOT_YIELD: "#2a9134", Maneuver.IGNORE: "#8a8a8a"}
 """Red yields and green does not, as in the DBN-PF blog post."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from merge_cosim.cosim.scoring import KINDS
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.tables import runs_in_sumo
+from merge_cosim.scoring.scoring import KINDS
 
 SAME_INSTANT = 1e-6
 """Times closer than this [s] are the same instant."""

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from merge_cosim.errors import UserError
-from merge_cosim.experiments.statistics.comparison import mcnemar
-from merge_cosim.experiments.statistics.summary import TRAFFIC, is_sample
-from merge_cosim.experiments.store import MANIFEST, ResultFolder
+from merge_cosim.core.errors import UserError
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order, is_reference
+from merge_cosim.results.statistics.comparison import mcnemar
+from merge_cosim.results.statistics.summary import TRAFFIC, is_sample
+from merge_cosim.results.store import MANIFEST, ResultFolder
 
 GROUP = ["scenario", "variation", "site", "source", "method"]
 MEASURES = {"distance_m": "D m", "delay_s": "delay s", "hardest_braking": "brake m/s²"}

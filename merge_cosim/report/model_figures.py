@@ -9,15 +9,15 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from merge_cosim.encounter import Intention
-from merge_cosim.intention.evidence import SpeedDensity
-from merge_cosim.intention.gaussian import WIDE_BIN
-from merge_cosim.intention.histogram import SPEED_BIN, SPEED_BINS, TIME_BIN
-from merge_cosim.intention.model import IntentionModel
-from merge_cosim.intention.pgm import Pgm
-from merge_cosim.intention.pgm_g import PgmG
+from merge_cosim.core.encounter import Intention
+from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.estimators.evidence import SpeedDensity
+from merge_cosim.estimators.learned.gaussian import WIDE_BIN
+from merge_cosim.estimators.learned.histogram import SPEED_BIN, SPEED_BINS, TIME_BIN
+from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.estimators.pgm import Pgm
+from merge_cosim.estimators.pgm_g import PgmG
 from merge_cosim.report import canvas
-from merge_cosim.units import FloatArray, IntArray
 
 COLORS = {Intention.YIELD: "#0072B2", Intention.NOT_YIELD: "#D55E00"}
 NAMES = {Intention.YIELD: "yield", Intention.NOT_YIELD: "not yield"}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from merge_cosim.encounter import Intention
-from merge_cosim.intention.model import IntentionModel
+from merge_cosim.core.encounter import Intention
+from merge_cosim.core.units import FOOT
+from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.report.published import PUBLISHED_MIXTURES
-from merge_cosim.units import FOOT
 
 
 def gmm_table(model: IntentionModel) -> list[dict[str, Any]]:

@@ -9,10 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from merge_cosim.errors import UserError
-from merge_cosim.experiments.statistics.comparison import reference_of
-from merge_cosim.experiments.statistics.summary import ALL_SITES, GROUP, TRAFFIC, compare_all
-from merge_cosim.experiments.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, ResultFolder
+from merge_cosim.core.errors import UserError
 from merge_cosim.report import case_figures, collisions, measure_tables, set_figures, tables
 from merge_cosim.report.columns import Table
 from merge_cosim.report.export import write_tables
@@ -21,6 +18,9 @@ from merge_cosim.report.methods import Look, in_order, looks
 from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER, PUBLISHED
 from merge_cosim.report.tables import Section
 from merge_cosim.report.traffic_table import traffic_table
+from merge_cosim.results.statistics.comparison import reference_of
+from merge_cosim.results.statistics.summary import ALL_SITES, GROUP, TRAFFIC, compare_all
+from merge_cosim.results.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, ResultFolder
 
 REPORT = "report.html"
 SOURCES = {
@@ -88,7 +88,7 @@ def write_report(folder: Path, against: str | None = None) -> Path:
         variations=variations.values(),
         contacts=contacts,
         traffic=traffic,
-        told=store.told(),
+        note_lines=store.note_lines(),
         explained=collisions.explained(results),
         papers=(PGM_PAPER, FG_GMM_PAPER),
     )

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from merge_cosim.experiments.statistics.summary import ALL_SITES, AMBIGUITY_EDGES
+from merge_cosim.core.units import FloatArray
 from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look, in_order
-from merge_cosim.units import FloatArray
+from merge_cosim.results.statistics.summary import ALL_SITES, AMBIGUITY_EDGES
 
 GRID_CASE = r"^d(?P<offset>[+-][\d.]+)_h(?P<host>[\d.]+)_m(?P<merging>[\d.]+)$"
 """Name of a grid's case: the host's offset [m] and both initial speeds [m/s]."""

@@ -7,8 +7,8 @@ from command import merge_cosim
 
 from merge_cosim.bench import loops
 from merge_cosim.bench.updates import estimator_costs
-from merge_cosim.errors import UserError
-from merge_cosim.intention.base import estimators
+from merge_cosim.core.errors import UserError
+from merge_cosim.estimators.base import estimators
 
 
 @pytest.mark.slow
@@ -64,13 +64,13 @@ def test_outcomes_are_compared_case_by_case(monkeypatch):
 
 def test_the_sample_holds_failures(tmp_path):
     batch = loops._batch(400)
-    from merge_cosim.experiments.work import Workplace
+    from merge_cosim.sweeps.task import WorkerSession
 
-    workplace = Workplace()
+    worker_session = WorkerSession()
     try:
-        rows, _ = batch.run(workplace)
+        rows, _ = batch.run(worker_session)
     finally:
-        workplace.close()
+        worker_session.close()
     assert 0 < sum(rows["failed"].to_pylist()) < len(rows)
 
 

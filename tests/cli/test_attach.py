@@ -8,8 +8,8 @@ import sumolib
 from command import merge_cosim, refused
 from running import Running
 
-from merge_cosim.cosim import attached
-from merge_cosim.experiments.plan import SweepRequest, plan
+from merge_cosim.sumo import attach as attached
+from merge_cosim.sweeps.plan import SweepRequest, plan
 
 TRAFFIC = """<routes>
 <vehicle id="other" depart="0" departLane="best" departPos="300" departSpeed="max">

@@ -12,10 +12,10 @@ import pytest
 import sumolib
 from command import merge_cosim, refused
 
-from merge_cosim.errors import UserError
-from merge_cosim.experiments.commonroad import need_library
-from merge_cosim.ramps.lanelets import lanelets
-from merge_cosim.ramps.poses import SIDEWAYS, poses
+from merge_cosim.core.errors import UserError
+from merge_cosim.ramps.export.commonroad import need_library
+from merge_cosim.ramps.export.lanelets import lanelets
+from merge_cosim.ramps.export.poses import SIDEWAYS, poses
 from merge_cosim.ramps.ramp import Ramp
 
 pytest.importorskip("commonroad")

@@ -8,7 +8,7 @@ from command import merge_cosim, refused
 from lxml import etree
 from scene_files import small_scene
 
-from merge_cosim.files import shipped
+from merge_cosim.core.files import shipped
 
 CASE = "surrogate_1-112.1-h106.1"
 

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from merge_cosim.cli.ngsim import app
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 
 runner = CliRunner()
 

@@ -14,8 +14,8 @@ import sumo
 import sumolib
 from command import merge_cosim, refused
 
-from merge_cosim.experiments.plan import SweepRequest, plan
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.sweeps.plan import SweepRequest, plan
 
 OUTPUTS = ("fcd", "ssm", "lanechange", "tripinfo", "collisions")
 ROUNDING = 2e-6

@@ -229,8 +229,8 @@ def test_a_listener_refuses_other_conditions(minute):
     folder, _, _ = minute
     script = """
 import libsumo, sys
-from merge_cosim.errors import UserError
-from merge_cosim.experiments.listener import HostListener
+from merge_cosim.core.errors import UserError
+from merge_cosim.sweeps.listener import HostListener
 step, several, ramp = sys.argv[1:]
 libsumo.start(["sumo", "-c", "files/traffic.sumocfg", "--no-step-log", "true", "--step-length", step])
 try:

@@ -12,9 +12,9 @@ import pyarrow.parquet as pq
 import pytest
 from command import merge_cosim, refused, small_scenario, summary
 
-from merge_cosim.errors import UserError
-from merge_cosim.experiments.store import ResultFolder
-from merge_cosim.files import shipped
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import shipped
+from merge_cosim.results.store import ResultFolder
 
 CONTRACT = [
     "scenario",
@@ -276,7 +276,7 @@ def test_a_plugin_drives_like_ours(tmp_path):
 from dataclasses import dataclass
 from typing import ClassVar
 import numpy as np
-from merge_cosim.intention.base import Estimator, estimators
+from merge_cosim.estimators.base import Estimator, estimators
 
 @estimators.register
 @dataclass(kw_only=True)

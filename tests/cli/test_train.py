@@ -5,8 +5,8 @@ import json
 import numpy as np
 from command import merge_cosim
 
-from merge_cosim.experiments.judging import DENSITIES, JUDGED
-from merge_cosim.intention.model import IntentionModel
+from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.studies.judging import DENSITIES, JUDGED
 
 
 def test_the_shipped_model_is_what_training_makes(tmp_path, data_dir):

@@ -1,7 +1,7 @@
 import pytest
 from ngsim_files import car, write_csv, write_portal
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.convert import Recording, convert
 from merge_cosim.ngsim.data import load_trajectories
 from merge_cosim.ngsim.sites import I80, US101

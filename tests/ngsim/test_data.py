@@ -5,7 +5,7 @@ import pyarrow.parquet as pq
 import pytest
 from ngsim_files import car, write_csv, write_portal, write_text
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.data import cached, data_files, episode_files, find_data, load_trajectories
 from merge_cosim.ngsim.formats import Kind
 from merge_cosim.ngsim.read import read_file

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 from ngsim_files import car, write_csv, write_portal, write_text
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.formats import NGSIM, OWN, Kind, sources
 from merge_cosim.ngsim.table import SCHEMA
 

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 from ngsim_files import HEADER, ORIGIN, car, write_csv, write_portal, write_text
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim import blocks
 from merge_cosim.ngsim.read import merge, read_file
 from merge_cosim.ngsim.sites import I80, US101

@@ -1,6 +1,6 @@
 import pytest
 
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.sites import I80, US101, site
 
 

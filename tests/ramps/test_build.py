@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 from test_ramp import NAMES, copy_with
 
-from merge_cosim.errors import UserError
-from merge_cosim.files import shipped
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import shipped
 from merge_cosim.ramps.build import build
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from test_ramp import NAMES, copy_with
 
-from merge_cosim.files import shipped
+from merge_cosim.core.files import shipped
 from merge_cosim.ramps.build import build
 from merge_cosim.ramps.check import check, notes
-from merge_cosim.ramps.new import RampNumbers, new_ramp
+from merge_cosim.ramps.create.new import RampNumbers, new_ramp
 
 LANE = RampNumbers(lanes=2, acceleration_lane=250.0)
 ON = '<connection from="merge" fromLane="1" to="main_out" toLane="0"/>'

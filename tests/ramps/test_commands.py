@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from merge_cosim.cli.ramp import app
-from merge_cosim.errors import UserError
+from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.ramp import Ramp
 
 RUN = CliRunner()

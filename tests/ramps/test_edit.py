@@ -6,8 +6,8 @@ import pytest
 from test_ramp import NAMES, copy_with
 
 from merge_cosim.ramps.build import build, config, netconvert
+from merge_cosim.ramps.create.from_osm import ramp_from_osm
 from merge_cosim.ramps.edit import take_over_net
-from merge_cosim.ramps.from_osm import ramp_from_osm
 
 EXTRACT = Path(__file__).parents[2] / "docs" / "files" / "rosenbach.osm"
 

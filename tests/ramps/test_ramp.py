@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from merge_cosim.errors import UserError
-from merge_cosim.files import shipped
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import shipped
 from merge_cosim.ngsim.sites import SITES
 from merge_cosim.ramps.ramp import LanePosition, Ramp, ramp_names
 

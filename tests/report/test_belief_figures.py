@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from merge_cosim.intention.model import IntentionModel
+from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.report.belief_cases import behind_but_accelerating, pulls_ahead, stays_behind
 from merge_cosim.report.belief_figures import belief_figure, candidates_figure, clouds_figure
 

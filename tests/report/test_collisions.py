@@ -2,8 +2,6 @@
 
 import pandas as pd
 
-from merge_cosim.experiments.store import ResultFolder
-from merge_cosim.experiments.sweep import SweepRequest, sweep
 from merge_cosim.report.collisions import (
     BEFORE_SCORING,
     ON_THE_LINE,
@@ -12,6 +10,8 @@ from merge_cosim.report.collisions import (
     explained,
     kinds_of_difference,
 )
+from merge_cosim.results.store import ResultFolder
+from merge_cosim.sweeps.sweep import SweepRequest, sweep
 
 ONE_CASE = {
     "encounters.host_offset": {"from": -3, "to": -3, "step": 1},

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from merge_cosim.experiments.store import SUMMARY_JSON, ResultFolder
 from merge_cosim.report.case_figures import log_odds_figure, path_figures
 from merge_cosim.report.html import data_uri
 from merge_cosim.report.methods import looks
 from merge_cosim.report.set_figures import ambiguity_figure, failure_map, variation_figure
 from merge_cosim.report.tables import summary_frame
+from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
 
 
 def _trace(method: str, host_speed: float, odds: float, seconds: float = 4.0) -> pd.DataFrame:

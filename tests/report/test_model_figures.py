@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Ellipse
 
-from merge_cosim.intention.model import IntentionModel
+from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.report.model_figures import (
     LONGEST_TIME,
     MOST_PANELS,

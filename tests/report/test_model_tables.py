@@ -2,7 +2,7 @@
 
 import pytest
 
-from merge_cosim.intention.model import IntentionModel
+from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.report.model_tables import gmm_table
 from merge_cosim.report.published import MIXTURE_TABLE
 

@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from merge_cosim.experiments.reproduction import DESIGNED, NODE_SWEEP, PAIRS, Study, run, studies
-from merge_cosim.experiments.store import RESULTS
-from merge_cosim.experiments.sweep import SweepRequest
-from merge_cosim.report.papers import claims, tables
-from merge_cosim.report.papers.evidence import Evidence, gather
-from merge_cosim.report.papers.page import write_reproduction
 from merge_cosim.report.published import published
+from merge_cosim.results.store import RESULTS
+from merge_cosim.studies.papers import claims, tables
+from merge_cosim.studies.papers.evidence import Evidence, gather
+from merge_cosim.studies.papers.page import write_reproduction
+from merge_cosim.studies.reproduction import DESIGNED, NODE_SWEEP, PAIRS, Study, run, studies
+from merge_cosim.sweeps.sweep import SweepRequest
 
 METHODS = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg", "fg-gmm", "always-go", "human")
 COARSE = {f"encounters.{name}.step": 12 for name in ("host_speed", "merging_speed")} | {

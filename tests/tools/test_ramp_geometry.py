@@ -16,10 +16,10 @@ from geometry.sites import TIES
 from lxml import etree
 from ramp_geometry import NETS, fitted, plan_of
 
+from merge_cosim.core.units import FOOT
 from merge_cosim.ramps.definition import read_ramp_file
 from merge_cosim.ramps.ramp import Ramp, read_net
 from merge_cosim.ramps.view import ROLES
-from merge_cosim.units import FOOT
 
 SITES = ("us101", "i80")
 LOCAL_X_EDGES = (12.75, 24.65, 35.1, 46.9, 57.7)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from geometry.lines import SURVEY_FOOT, FloatArray, Line
-from merge_cosim.units import FOOT
+from merge_cosim.core.units import FOOT
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,31 @@
+"""The role of a controller: from the decision to the host's acceleration."""
+
+from abc import abstractmethod
+
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.registry import Component, Registry
+from merge_cosim.core.units import BoolArray, FloatArray, IntArray
+
+
+class Controller(Component):
+    """Turns what is seen and believed into accelerations of the host; parameters are dataclass fields."""
+
+    def start(self, count: int, setting: Setting) -> None:
+        """Make room for a batch of `count` encounters and forget everything before."""
+        self.setting = setting
+
+    def reset(self, rows: IntArray) -> None:
+        """Forget the encounters at `rows` of the batch; new ones begin there."""
+
+    @abstractmethod
+    def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
+        """Return the host's acceleration [m/s^2], shape (n,).
+
+        Args:
+            seen: The present cycle.
+            log_odds: `log P(NOT_YIELD) - log P(YIELD)`, shape (n,).
+            target: The merging car is the one to keep distance to, shape (n,).
+        """
+
+
+controllers: Registry[Controller] = Registry("controller", "merge_cosim.controllers")

@@ -1,0 +1,1 @@
+"""What every other package uses: encounters, observations, registries, random streams, units, files, errors."""

@@ -1,0 +1,64 @@
+"""What the cars see of each other in one cycle, and the setting they drive in: the currency of floor 2."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from merge_cosim.core.units import DT, TOLERANCE, BoolArray, FloatArray, time_to_arrival
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is the same for every car of a run.
+
+    Attributes:
+        speed_limit: Speed limit [m/s].
+        dt: Length of a cycle [s].
+    """
+
+    speed_limit: float = 29.0
+    dt: float = DT
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One cycle of a batch of encounters, or some cycles of it laid end to end; every array has shape (n,).
+
+    Attributes:
+        host_station, host_speed: State of the host [m, m/s].
+        merging_station, merging_speed: State of the merging car as the host observes it [m, m/s].
+        host_length, merging_length: Lengths [m].
+    """
+
+    host_station: FloatArray
+    host_speed: FloatArray
+    merging_station: FloatArray
+    merging_speed: FloatArray
+    host_length: FloatArray
+    merging_length: FloatArray
+
+    @property
+    def host_arrival(self) -> FloatArray:
+        """The host's time to arrival T_h [s]."""
+        return time_to_arrival(self.host_station, self.host_speed)
+
+    @property
+    def merging_arrival(self) -> FloatArray:
+        """The merging car's time to arrival T_m [s]."""
+        return time_to_arrival(self.merging_station, self.merging_speed)
+
+    @property
+    def merging_in_lane(self) -> BoolArray:
+        """The merging car has reached the merging point."""
+        return self.merging_station >= -TOLERANCE
+
+    @property
+    def merging_ahead(self) -> BoolArray:
+        """The merging car's front is level with the host's or past it."""
+        return self.merging_station - self.host_station >= -TOLERANCE
+
+    @property
+    def gap(self) -> FloatArray:
+        """Bumper-to-bumper distance [m] of whoever is behind to whoever is ahead; negative where the bodies overlap."""
+        leader_length = np.where(self.merging_ahead, self.merging_length, self.host_length)
+        return np.abs(self.merging_station - self.host_station) - leader_length

@@ -1,0 +1,53 @@
+"""Random numbers by counter: each encounter has a stream of its own, whatever stands beside it in the batch.
+
+The i-th number of a stream is a hash of the stream's key and i (SplitMix64: Steele, Lea, Flood, Fast splittable
+pseudorandom number generators, OOPSLA 2014), so whole batches are drawn at once and no generator objects are kept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from merge_cosim.core.units import AnyArray, FloatArray, IntArray
+
+Keys = NDArray[np.uint64]
+
+_GOLDEN, _FIRST, _SECOND = (np.uint64(c) for c in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB))
+_STEPS = tuple(np.uint64(bits) for bits in (30, 27, 31))
+_UNIT_BITS, _UNIT = np.uint64(11), 2.0**-53
+
+
+def stream_keys(names: AnyArray, seed: int) -> Keys:
+    """Return the key of each name's stream under a seed, shape (n,): the same for the same name wherever it stands."""
+    digests = b"".join(hashlib.blake2b(f"{seed}/{name}".encode(), digest_size=8).digest() for name in names.tolist())
+    return np.frombuffer(digests, dtype="<u8").astype(np.uint64)
+
+
+def uniform(keys: Keys, first: IntArray, count: int) -> FloatArray:
+    """Return numbers `first` to `first + count - 1` of each stream, uniform on (0, 1).
+
+    Args:
+        keys: Keys of the streams, shape (n,).
+        first: Where to begin in each stream, shape (n,).
+        count: How many numbers to take of each.
+
+    Returns:
+        Shape (n, count).
+    """
+    place = first.astype(np.uint64)[:, None] + np.arange(1, count + 1, dtype=np.uint64)
+    mixed: Keys = np.add(keys[:, None], place * _GOLDEN, dtype=np.uint64)
+    mixed = (mixed ^ (mixed >> _STEPS[0])) * _FIRST
+    mixed = (mixed ^ (mixed >> _STEPS[1])) * _SECOND
+    mixed ^= mixed >> _STEPS[2]
+    return ((mixed >> _UNIT_BITS).astype(np.float64) + 0.5) * _UNIT
+
+
+def normal(keys: Keys, first: IntArray, count: int) -> FloatArray:
+    """Return standard normal numbers of each stream (the quantiles of `uniform`), shape (n, count)."""
+    from scipy.special import ndtri
+
+    numbers: FloatArray = ndtri(uniform(keys, first, count))
+    return numbers

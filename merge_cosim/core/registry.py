@@ -1,0 +1,148 @@
+"""Registries: a component is one class in one file of its room, found by name without another edit."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import pkgutil
+import re
+import sys
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, ClassVar, Generic, TypeVar
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from merge_cosim.core.errors import UserError
+
+
+class Component(ABC):
+    """A swappable part of a run: a dataclass whose fields are its parameters.
+
+    Attributes:
+        name: The name by which the command line, scenarios and tables call it.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(allow_inf_nan=False)
+    name: ClassVar[str]
+
+
+C = TypeVar("C", bound=Component)
+
+
+class Registry(Generic[C]):
+    """The components of one role, by name.
+
+    All modules of `package` are searched on first use, then the entry points of the group `merge_cosim.<role>`.
+    """
+
+    def __init__(self, role: str, package: str) -> None:
+        self.role = role
+        self._package = package
+        self._classes: dict[str, type[C]] = {}
+        self._searched = False
+
+    def register(self, cls: type[C]) -> type[C]:
+        """Class decorator: enter `cls` under its `name`; a name that is taken is refused."""
+        known = self._classes.get(cls.name)
+        if known is not None and _full_name(known) != _full_name(cls):  # else its file was imported anew
+            taken = f"the {self.role} name '{cls.name}' is taken by {_full_name(known)}"
+            raise UserError(f"{_full_name(cls)}: {taken}; rename yours")
+        self._classes[cls.name] = cls
+        return cls
+
+    def names(self) -> list[str]:
+        """All names, sorted."""
+        self._search()
+        return sorted(self._classes)
+
+    def __contains__(self, name: str) -> bool:
+        self._search()
+        return name in self._classes
+
+    def __getitem__(self, name: str) -> type[C]:
+        self._search()
+        if name not in self._classes:
+            raise UserError(f"unknown {self.role} '{name}'{did_you_mean(name, self._classes)}")
+        return self._classes[name]
+
+    def build(self, name: str, values: Mapping[str, Any], where: str) -> C:
+        """Make the component `name` with the given parameters; `where` begins the message about a bad one."""
+        return validated(self[name], values, f"{where}: {self.role} {name}")
+
+    def _search(self) -> None:
+        if self._searched:
+            return
+        self._searched = True
+        package = importlib.import_module(self._package)
+        for module in pkgutil.iter_modules(package.__path__):
+            importlib.import_module(f"{self._package}.{module.name}")
+        for entry in entry_points(group=f"merge_cosim.{self.role.replace(' ', '_')}"):
+            entry.load()
+
+
+def _full_name(cls: type) -> str:
+    return f"{cls.__module__}.{cls.__qualname__}"
+
+
+def did_you_mean(name: str, choices: Mapping[str, Any] | list[str]) -> str:
+    """The tail of a message about an unknown name: the nearest choice, and all of them."""
+    near = get_close_matches(name, list(choices), n=1)
+    hint = f"; did you mean '{near[0]}'?" if near else ""
+    return f"{hint} (choose from: {', '.join(sorted(set(choices))) or 'none'})"
+
+
+def parameters(cls: type) -> dict[str, Any]:
+    """Names and defaults of a component's parameters: its dataclass fields."""
+    return {f.name: f.default for f in fields(cls) if f.init}
+
+
+def meanings(cls: type) -> dict[str, str]:
+    """What each parameter means: its entry under `Attributes:` in the docstring of its class or a base."""
+    found: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        _, _, attributes = inspect.cleandoc(base.__dict__.get("__doc__") or "").partition("\nAttributes:\n")
+        for entry in re.split(r"\n {4}(?=\S)", "\n" + attributes)[1:]:
+            names, _, meaning = entry.partition(":")
+            found |= dict.fromkeys(names.split(", "), " ".join(meaning.split()))
+    return {name: found.get(name, "") for name in parameters(cls)}
+
+
+def validated(cls: type[C], values: Mapping[str, Any], where: str) -> C:
+    """Make the dataclass `cls`, with its fields converted and checked by their type hints."""
+    for key in values:
+        if key not in parameters(cls):
+            raise UserError(f"{where}: no parameter '{key}'{did_you_mean(key, parameters(cls))}")
+    try:
+        made: C = TypeAdapter(cls).validate_python(dict(values))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise UserError(f"{where}: {'.'.join(map(str, first['loc']))} = {first['input']!r}: {first['msg']}") from None
+    return made
+
+
+def load_plugin(file: Path) -> None:
+    """Import a user's own file, whose classes register themselves."""
+    if not file.is_file():
+        raise UserError(f"{file}: no such plugin file")
+    imported = (getattr(module, "__file__", None) for module in tuple(sys.modules.values()))
+    if any(name and Path(name).resolve() == file.resolve() for name in imported):
+        return
+    module_name = f"merge_cosim_plugin_{file.stem}"
+    spec = importlib.util.spec_from_file_location(module_name, file)
+    if spec is None or spec.loader is None:
+        raise UserError(f"{file}: not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    try:
+        spec.loader.exec_module(module)
+    except UserError:
+        raise
+    except Exception as error:  # whatever a user's file raises is theirs to mend
+        del sys.modules[module_name]
+        raise UserError(f"{file}: cannot be imported: {type(error).__name__}: {error}") from error

@@ -1,1 +1,0 @@
-"""The co-simulation loop: SUMO session, stepping, observing, commanding, scoring."""

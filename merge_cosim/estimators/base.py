@@ -1,0 +1,59 @@
+"""The role of an estimator: from what is seen to the log-odds of NOT_YIELD."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.random_streams import Keys
+from merge_cosim.core.registry import Component, Registry
+from merge_cosim.core.units import BoolArray, FloatArray, IntArray
+from merge_cosim.estimators.learned.model import IntentionModel
+
+
+class Estimator(Component):
+    """Estimates whether the merging driver yields, for a batch of encounters at once; parameters are dataclass fields.
+
+    Work per cycle must not grow with the history, and each encounter's result must not depend on its neighbours in
+    the batch: no matrix products and no sums along the batch axis.
+
+    Attributes:
+        default_controller: Controller of the method that is called by the estimator's name alone.
+        needs_model: `use` must be called with a trained model before `start`.
+        needs_label: It looks at the label, so it is a reference and no method.
+    """
+
+    default_controller: ClassVar[str] = "acc"
+    needs_model: ClassVar[bool] = False
+    needs_label: ClassVar[bool] = False
+
+    def use(self, model: IntentionModel) -> None:
+        """Take what was learned from data."""
+
+    def start(self, count: int, setting: Setting) -> None:
+        """Make room for a batch of `count` encounters and forget everything before."""
+        self.setting = setting
+
+    def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
+        """Forget the encounters at `rows` of the batch; new ones begin there.
+
+        Args:
+            rows: Where they begin, shape (m,).
+            labels: What the log or the script says they are (`Intention`); for references only. Shape (m,).
+            keys: Key of each one's random stream (`merge_cosim.core.random_streams`), shape (m,).
+        """
+
+    @abstractmethod
+    def update(self, seen: Observation) -> FloatArray:
+        """Take in one cycle and return `log P(NOT_YIELD) - log P(YIELD)`, shape (n,); +-inf for a rule, never NaN."""
+
+
+estimators: Registry[Estimator] = Registry("estimator", "merge_cosim.estimators")
+
+
+def certain(not_yield: BoolArray) -> FloatArray:
+    """Log-odds of a rule without doubt: +inf where NOT_YIELD, -inf where YIELD."""
+    return np.where(not_yield, np.inf, -np.inf)

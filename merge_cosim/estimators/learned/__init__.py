@@ -1,0 +1,1 @@
+"""What estimators learn from data: densities of speeds and times, the model file, fitting."""

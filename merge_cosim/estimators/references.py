@@ -1,0 +1,71 @@
+"""References that bound what an estimator can do: constant decisions, and knowing the label."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from merge_cosim.core.encounter import Intention
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.random_streams import Keys
+from merge_cosim.core.units import TOLERANCE, FloatArray, IntArray
+from merge_cosim.estimators.base import Estimator, certain, estimators
+
+
+@estimators.register
+@dataclass(kw_only=True)
+class AlwaysGo(Estimator):
+    """Takes every driver to YIELD, so the host drives freely until somebody is in the lane ahead."""
+
+    name: ClassVar[str] = "always-go"
+
+    def update(self, seen: Observation) -> FloatArray:
+        """YIELD, for ever."""
+        return np.full(len(seen.host_station), -np.inf)
+
+
+@estimators.register
+@dataclass(kw_only=True)
+class AlwaysYield(Estimator):
+    """Takes every driver to NOT_YIELD, so the host keeps distance to every merging car."""
+
+    name: ClassVar[str] = "always-yield"
+
+    def update(self, seen: Observation) -> FloatArray:
+        """NOT_YIELD, for ever."""
+        return np.full(len(seen.host_station), np.inf)
+
+
+@estimators.register
+@dataclass(kw_only=True)
+class AlwaysBrake(AlwaysYield):
+    """Brakes fully and never passes: fails nothing, reaches nothing."""
+
+    name: ClassVar[str] = "always-brake"
+    default_controller: ClassVar[str] = "brake"
+
+
+@estimators.register
+@dataclass(kw_only=True)
+class OracleLabel(Estimator):
+    """Knows the label. Not a bound: the host's own driving may turn the order round.
+
+    Where a case has no label (a scripted driver who ignores the host), who arrives first goes first, as in `slot-time`.
+    """
+
+    name: ClassVar[str] = "oracle-label"
+    needs_label: ClassVar[bool] = True
+
+    def start(self, count: int, setting: Setting) -> None:
+        """Make room for the labels."""
+        super().start(count, setting)
+        self._labels = np.full(count, int(Intention.YIELD))
+
+    def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
+        """Learn the labels of the new encounters."""
+        self._labels[rows] = labels
+
+    def update(self, seen: Observation) -> FloatArray:
+        """The label, from the first cycle to the last."""
+        first = seen.merging_arrival - seen.host_arrival <= TOLERANCE
+        return certain(np.where(self._labels == Intention.UNKNOWN, first, self._labels == Intention.NOT_YIELD))

@@ -1,1 +1,0 @@
-"""Scenarios, sweeps, result store, statistics, training."""

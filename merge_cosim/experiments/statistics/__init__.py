@@ -1,6 +1,0 @@
-"""Statistics over result rows: summaries with intervals, comparisons on the same cases, and how good beliefs are."""
-
-from merge_cosim.experiments.statistics.belief import belief, calibration
-from merge_cosim.experiments.statistics.summary import oracle_best, strata, summarise
-
-__all__ = ["belief", "calibration", "oracle_best", "strata", "summarise"]

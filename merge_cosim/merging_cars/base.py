@@ -1,0 +1,43 @@
+"""The role of a merging car: how the other driver drives."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+
+from merge_cosim.core.encounter import Encounters, Intention
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.registry import Component, Registry
+from merge_cosim.core.units import FloatArray, IntArray
+
+
+class MergingCar(Component):
+    """Drives the merging cars of a batch of encounters; parameters are dataclass fields."""
+
+    def start(self, encounters: Encounters, count: int, setting: Setting) -> None:
+        """Make room for `count` encounters at a time, drawn from `encounters`, and forget everything before."""
+        self.setting = setting
+
+    def reset(self, rows: IntArray, cases: IntArray) -> None:
+        """Begin the encounters `cases` (indices into those of `start`) at `rows` of the batch."""
+
+    @abstractmethod
+    def next_speed(self, age: IntArray, now: Observation) -> FloatArray:
+        """Return the speed [m/s] to drive with in this cycle, shape (n,).
+
+        Args:
+            age: Cycles since each encounter's start, shape (n,).
+            now: The true state of both cars.
+        """
+
+    def intentions(self, encounters: Encounters) -> IntArray:
+        """What the drivers of some encounters mean to do (`Intention`), where it is scripted; shape (n,)."""
+        return np.full(len(encounters), int(Intention.UNKNOWN))
+
+    def observed_speed(self, age: IntArray, speed: FloatArray) -> FloatArray:
+        """The speed [m/s] that the host's sensors report for him; the true one unless the log says otherwise."""
+        return speed
+
+
+merging_cars: Registry[MergingCar] = Registry("merging car", "merge_cosim.merging_cars")

@@ -1,0 +1,43 @@
+"""The papers' designed merging strategy: accelerate to the limit, or keep distance to a host ahead."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import NonNegativeFloat
+
+from merge_cosim.controllers.law import DistanceKeeping
+from merge_cosim.core.observation import Observation
+from merge_cosim.core.units import TOLERANCE, FloatArray, IntArray
+from merge_cosim.merging_cars.base import MergingCar, merging_cars
+
+
+@merging_cars.register
+@dataclass(kw_only=True)
+class Designed(DistanceKeeping, MergingCar):
+    """No car ahead: free driving to the limit. Host ahead: distance keeping to it (Dong et al. 2017, Sec. V-B).
+
+    The papers do not say when the host is 'ahead'; `ahead` sets it.
+
+    Attributes:
+        headway: Time headway T [s].
+        ahead: `clear`: the host's rear bumper is past his front bumper; `in-lane`: the host's front is past his, both
+            past the merging point; `any`: the host's front is past his.
+    """
+
+    name: ClassVar[str] = "designed"
+    headway: NonNegativeFloat = 1.0
+    ahead: Literal["clear", "in-lane", "any"] = "clear"
+
+    def next_speed(self, age: IntArray, now: Observation) -> FloatArray:
+        """One step of the strategy."""
+        lead = now.host_station - now.merging_station
+        gap = lead - now.host_length
+        if self.ahead == "clear":
+            host_ahead = gap > TOLERANCE
+        else:
+            host_ahead = lead > TOLERANCE
+            if self.ahead == "in-lane":
+                host_ahead &= np.minimum(now.merging_station, now.host_station) >= -TOLERANCE
+        acceleration = self.drive(host_ahead, gap, now.merging_speed, now.host_speed, self.setting.speed_limit)
+        return np.maximum(now.merging_speed + acceleration * self.setting.dt, 0.0)

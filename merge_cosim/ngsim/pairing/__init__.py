@@ -1,0 +1,1 @@
+"""From trajectories to encounters: tracks, pairs, windows, filters, splits."""

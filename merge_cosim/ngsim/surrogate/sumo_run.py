@@ -1,0 +1,151 @@
+"""One run of SUMO's own traffic on a ramp: its input files, and the trajectories that come out."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import sumolib
+from lxml import etree
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import DT, HOUR
+from merge_cosim.ngsim.surrogate.recipe import Recipe
+from merge_cosim.ramps.ramp import Ramp
+
+_FILES = {"routes": "rou.xml", "signs": "add.xml", "edges": "txt", "fcd": "parquet"}
+
+RUN_OUT = 150.0
+"""Cars leave the net this far beyond the recorded road [m], so that its end does not show."""
+
+COLUMNS = ("id", "type", "lane", "pos", "posLat", "speed", "acceleration")
+"""What SUMO writes of each car and cycle, beside the time."""
+
+
+def simulate(recipe: Recipe, ramp: Ramp, seed: int, end: float, folder: Path) -> Path:
+    """Run SUMO and return its trajectories (floating car data, Parquet).
+
+    Args:
+        recipe: The traffic.
+        ramp: Where it drives.
+        seed: SUMO's random seed.
+        end: Where the recorded road ends [m past the gore].
+        folder: For the files of this run.
+
+    Raises:
+        UserError: SUMO fails.
+    """
+    lanes = _lanes(ramp)
+    files = {name: folder / f"{name}.{kind}" for name, kind in _FILES.items()}
+    _write(files["routes"], _routes(recipe, ramp, end + RUN_OUT))
+    _write(files["signs"], _signs(recipe, ramp, lanes))
+    files["edges"].write_text("".join(f"edge:{edge}\n" for edge in lanes))
+    options = {
+        "net-file": ramp.net,
+        "route-files": files["routes"],
+        "additional-files": files["signs"],
+        "end": recipe.warm_up + recipe.duration,
+        "step-length": DT,
+        "seed": seed,
+        "lanechange.duration": recipe.change_time,
+        "time-to-teleport": -1,
+        "collision.action": "none",
+        "no-internal-links": "true",
+        "no-step-log": "true",
+        "no-warnings": "true",
+        "fcd-output": files["fcd"],
+        "fcd-output.attributes": ",".join(COLUMNS),
+        "fcd-output.filter-edges.input-file": files["edges"],
+        "fcd-output.skip-empty": "true",
+        "device.fcd.begin": recipe.warm_up,
+    }
+    words = [word for key, value in options.items() for word in (f"--{key}", str(value))]
+    done = subprocess.run([sumolib.checkBinary("sumo"), *words], capture_output=True, text=True, check=False)
+    if done.returncode or not files["fcd"].is_file():
+        raise UserError(f"{ramp.net}: SUMO fails on it: {(done.stderr.strip() or 'no reason given').splitlines()[0]}")
+    return files["fcd"]
+
+
+def _lanes(ramp: Ramp) -> dict[str, list[str]]:
+    """The SUMO lanes of each recorded edge."""
+    assert ramp.ngsim is not None
+    lanes: dict[str, list[str]] = {}
+    for lane in (lane for along in ramp.ngsim.lanes.values() for lane in along):
+        lanes.setdefault(lane.rpartition("_")[0], []).append(lane)
+    return lanes
+
+
+def _routes(recipe: Recipe, ramp: Ramp, end: float) -> etree._Element:
+    """Drivers and demand; cars leave the main road at `end` [m past the gore]."""
+    root = etree.Element("routes")
+    kinds = etree.SubElement(root, "vTypeDistribution", id="drivers")
+    for number, kind in enumerate(recipe.drivers):
+        etree.SubElement(
+            kinds,
+            "vType",
+            id=f"drivers-{number}",
+            carFollowModel="EIDM",
+            probability=repr(kind.share),
+            length=repr(kind.length),
+            tau=repr(kind.tau),
+            accel=repr(kind.accel),
+            decel=repr(kind.decel),
+            minGap=repr(recipe.min_gap),
+            speedFactor="normc({},{},{},{})".format(*recipe.speed_factor),
+            lcAssertive=repr(recipe.assertive),
+            lcStrategic=repr(recipe.strategic),
+            lcCooperative=repr(recipe.cooperative),
+            lcSpeedGain=repr(recipe.speed_gain),
+            lcKeepRight="0",
+        )
+    last = ramp.main[-1]
+    exits = [edge for edge in _lanes(ramp) if edge not in (*ramp.main_route, *ramp.ramp_route)]
+    shared = ramp.ramp[-1].edge
+    leave = {"arrivalPos": repr(end - last.start)}
+    flows = {
+        "through": (recipe.through, ramp.main_route, {"departLane": "random", **leave}),
+        "leaving": (recipe.leaving, (*ramp.main_route[: ramp.main_route.index(shared) + 1], *exits), {}),
+        "merging": (recipe.merging, ramp.ramp_route, leave),
+    }
+    for name, (per_hour, route, how) in flows.items():
+        if not per_hour:
+            continue
+        apart = HOUR / per_hour
+        flow = etree.SubElement(
+            root,
+            "flow",
+            {"departLane": "first", "departSpeed": "avg", **how},
+            id=name,
+            type="drivers",
+            begin="0",
+            end=repr(recipe.warm_up + recipe.duration),
+            period=repr(apart) if name == "merging" else f"exp({1 / apart!r})",
+        )
+        etree.SubElement(flow, "route", edges=" ".join(route))
+    return root
+
+
+def _signs(recipe: Recipe, ramp: Ramp, lanes: dict[str, list[str]]) -> etree._Element:
+    """Speed signs in place of the net's speed limits."""
+    root = etree.Element("additional")
+    for edge, along in lanes.items():
+        for lane in along:
+            sign = etree.SubElement(root, "variableSpeedSign", id=lane, lanes=lane)
+            etree.SubElement(sign, "step", time="0", speed=repr(_limit(recipe, ramp, edge, lane)))
+    return root
+
+
+def _limit(recipe: Recipe, ramp: Ramp, edge: str, lane: str) -> float:
+    """Speed limit of a lane [m/s]."""
+    if edge not in ramp.main_route:
+        return recipe.ramp_speed if edge in ramp.ramp_route else recipe.exit_speed
+    if lane == f"{ramp.ramp[-1].edge}_{ramp.ramp[-1].lane}":
+        return recipe.auxiliary_speed
+    start = next(section.start for section in ramp.main if section.edge == edge)
+    if start < 0.0:
+        return recipe.approach_speed
+    return recipe.beside_speed if start < ramp.auxiliary_end else recipe.onward_speed
+
+
+def _write(path: Path, root: etree._Element) -> None:
+    path.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))

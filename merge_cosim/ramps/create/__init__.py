@@ -1,0 +1,1 @@
+"""New ramps: from numbers, from a SUMO net, from OpenStreetMap."""

@@ -1,0 +1,55 @@
+"""Describe the on-ramp of somebody's own net in a `ramp.toml` beside it; the net stays as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.ramps.create.folder import definition_text
+from merge_cosim.ramps.create.new import RampNumbers, default_merging_point
+from merge_cosim.ramps.create.onramp import Origin, choose, read_source, sources_of, title_of
+from merge_cosim.ramps.definition import FILE_NAME, RampFile
+
+
+def describe_ramp(net_file: Path, link: str | None = None, speed_limit: float | None = None) -> Path:
+    """Write a `ramp.toml` beside a net, which names the net's own edges; returns the folder.
+
+    Args:
+        net_file: The SUMO net (`.net.xml` or `.net.xml.gz`).
+        link: An edge of the on-ramp; it may be left out where the net has one on-ramp only.
+        speed_limit: Speed limit of the main road [m/s]; that of the host's lane after the gore if not given.
+
+    Raises:
+        UserError: A `ramp.toml` is there already; the file is no net, or has no on-ramp, or several and `link` is not
+            given.
+    """
+    folder, origin = net_file.parent, Origin(net_file)
+    target = folder / FILE_NAME
+    net = read_source(net_file, net_file)
+    if target.exists():
+        raise UserError(f"{target}: exists already; remove it first, or copy the net to another folder")
+    try:
+        joint, path = choose(net, link, RampNumbers.upstream, RampNumbers.downstream)
+    except UserError as error:
+        raise UserError(f"{net_file}: {error}") from None
+    length = sum(float(lane.getLength()) for lane in path.beside)
+    given = None if speed_limit is None else "merge-cosim ramp describe"
+    merging = (*path.ramp, *path.beside)
+    definition = RampFile(
+        title=title_of(joint, folder.resolve().name),
+        net=net_file.name,
+        described=True,
+        main=[lane.getEdge().getID() for lane in path.main],
+        host_lane=[lane.getIndex() for lane in path.main],
+        ramp=[lane.getEdge().getID() for lane in merging],
+        merging_lane=[lane.getIndex() for lane in merging],
+        gore=joint.gore.getID(),
+        merging_point=default_merging_point(length),
+        speed_limit=round(speed_limit or float(path.main[path.before].getSpeed()), 2),
+        sources=sources_of(joint, path, length, origin, given),
+    )
+    try:
+        target.write_text(definition_text(definition), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{target}: cannot be written ({error.strerror})") from None
+    return folder

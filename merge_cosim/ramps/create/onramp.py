@@ -1,0 +1,139 @@
+"""One on-ramp of a user's net: read the net, choose the on-ramp, and say in words what was found."""
+
+from __future__ import annotations
+
+import gzip
+import html
+import zlib
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+import sumolib
+from lxml import etree
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.ramps.infer import Course, Joint, course, joint_of, joints
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a net was made from, for error lines and `ramp.toml`.
+
+    Attributes:
+        file: The user's file.
+        guessed: Parts of edge ids that netconvert gives where it guesses an acceleration lane.
+        unlimited: Edges without a speed limit in the file, whose lanes have a stand-in's.
+    """
+
+    file: Path
+    guessed: str | None = None
+    unlimited: Collection[str] = ()
+
+
+def root_element(file: Path) -> etree._Element:
+    """First element of an XML file, which may be compressed with gzip.
+
+    Raises:
+        UserError: The file is missing or no XML.
+    """
+    if not file.is_file():
+        raise UserError(f"{file}: no such file")
+    try:
+        with gzip.open(file) if file.suffix == ".gz" else file.open("rb") as content:
+            _, root = next(etree.iterparse(content, events=("start",)))
+    except (etree.XMLSyntaxError, OSError, EOFError, zlib.error, StopIteration):
+        raise UserError(f"{file}: not XML; a .pbf becomes OSM XML with: osmium cat FILE.osm.pbf -o FILE.osm") from None
+    return root
+
+
+def read_source(path: Path, named: Path) -> sumolib.net.Net:
+    """Read a net; `named` is the file that error lines speak of."""
+    root = root_element(path)
+    if root.tag != "net":
+        more = "an extract of OpenStreetMap goes with --from-osm" if root.tag == "osm" else "give a .net.xml"
+        raise UserError(f"{named}: its root is <{root.tag}>, not <net>; {more}")
+    if root.get("lefthand", "false").lower() in ("true", "1", "yes"):
+        raise UserError(f"{named}: a net with left-hand traffic; only right-hand traffic can be read")
+    try:
+        net = sumolib.net.readNet(str(path))
+    except Exception as error:  # sumolib passes on whatever its parser meets
+        raise UserError(f"{named}: not a SUMO net: {error}") from None
+    for edge in net.getEdges():
+        edge._name = html.unescape(edge.getName() or "")  # netconvert escapes names of OpenStreetMap twice
+    return net
+
+
+def choose(net: sumolib.net.Net, link: str | None, upstream: float, downstream: float) -> tuple[Joint, Course]:
+    """The on-ramp meant, and its course."""
+    if link is not None:
+        try:
+            joint = joint_of(net, link)
+        except UserError as error:
+            raise UserError(f"--link: {error}; {_listed(net, upstream, downstream)}") from None
+        return joint, course(joint, upstream, downstream)
+    found = joints(net)
+    usable, reasons = [], []
+    for joint in found:
+        try:
+            usable.append((joint, course(joint, upstream, downstream)))
+        except UserError as error:
+            reasons.append(str(error))
+    if len(usable) == 1:
+        return usable[0]
+    if usable or not found:
+        raise UserError(_listed(net, upstream, downstream))
+    raise UserError("; ".join(reasons))
+
+
+def _listed(net: sumolib.net.Net, upstream: float, downstream: float) -> str:
+    """Which on-ramps there are, in one line."""
+    shown = []
+    for joint in joints(net):
+        try:
+            beside = sum(lane.getLength() for lane in course(joint, upstream, downstream).beside)
+        except UserError:
+            continue
+        lane = f"acceleration lane {beside:.0f} m" if beside else "no acceleration lane"
+        shown.append(f"{joint.link.getID()} (into {joint.gore.getID()}, {lane})")
+    if not shown:
+        return (
+            "no on-ramp found: no edge of type motorway_link or trunk_link (or, in a net without such types, of fewer "
+            "lanes or a lower limit) joins a main road at an acute angle; name the on-ramp's last edge with --link"
+        )
+    many = f"{len(shown)} on-ramps; choose one" if len(shown) > 1 else "the one on-ramp is chosen"
+    return f"{many} with --link: {', '.join(shown)}"
+
+
+def sources_of(joint: Joint, path: Course, length: float, origin: Origin, given: str | None) -> dict[str, str]:
+    """Where each fact of a ramp but its geometry comes from, in words.
+
+    Args:
+        joint: Where the on-ramp comes in.
+        path: The two paths.
+        length: Length of the acceleration lane [m].
+        origin: What the net was made from.
+        given: The command to which the user has given the speed limit; None if it is the net's.
+    """
+    file, link, gore = origin.file.name, joint.link, path.main[path.before]
+    kind = link.getType() or "no type"
+    sources = {
+        "ramp": f"{file}: edge {link.getID()} ({kind}) joins {joint.through.getID()} at the gore.",
+        "merging_point": "Default: a fifth of the acceleration lane." if path.beside else "The gore.",
+        "speed_limit": f"{file}: lane {gore.getID()}.",
+    }
+    if path.beside:
+        sources["acceleration_lane"] = f"{file}: lane {path.beside[-1].getID()} {path.ending}."
+        if origin.guessed and origin.guessed in path.beside[0].getEdge().getID():
+            sources["acceleration_lane"] = f"Guessed by netconvert, {length:.0f} m: {file} has none."
+    if given:
+        sources["speed_limit"] = f"Given to {given}."
+    elif gore.getEdge().getID() in origin.unlimited:
+        sources["speed_limit"] = f"SUMO's default for this kind of road: {file} has no maxspeed here."
+    return sources
+
+
+def title_of(joint: Joint, name: str) -> str:
+    """The road's name, where it has one."""
+    road = joint.gore.getName() or joint.through.getName() or joint.gore.getParam("ref")
+    return f"{name}: {joint.link.getName() or 'on-ramp'} onto {road}" if road else name

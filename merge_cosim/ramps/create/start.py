@@ -1,0 +1,55 @@
+"""Start a ramp of one's own from whichever source the user has."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.ramps.create.from_net import ramp_from_net
+from merge_cosim.ramps.create.from_osm import ramp_from_osm
+from merge_cosim.ramps.create.new import RampNumbers, new_ramp
+from merge_cosim.ramps.definition import read_ramp_file
+
+FOR_FILES = ("upstream", "downstream", "speed_limit")
+"""Numbers that may be given beside a file."""
+
+
+def start_ramp(
+    folder: Path, numbers: Mapping[str, Any], net: Path | None, extract: Path | None, link: str | None
+) -> tuple[Path, list[str]]:
+    """Write a ramp into a new folder; also what was found in the file it was made from, a line each.
+
+    Args:
+        folder: Where to; its name is the ramp's.
+        numbers: Fields of `RampNumbers` that the user has given.
+        net: A SUMO net to take the ramp from.
+        extract: An extract of OpenStreetMap to take the ramp from.
+        link: An edge of the on-ramp in that file.
+
+    Raises:
+        UserError: The arguments contradict each other, or the ramp cannot be made.
+    """
+    if net is not None and extract is not None:
+        raise UserError("ramp new: give --from-net or --from-osm, not both")
+    if net is None and extract is None:
+        if link is not None:
+            raise UserError("ramp new: --link names an edge of a file; give --from-net or --from-osm, too")
+        return new_ramp(folder, RampNumbers(**numbers)), []
+    for key in numbers:
+        if key not in FOR_FILES:
+            raise UserError(f"ramp new: --{key.replace('_', '-')} comes from the file; leave it out")
+    if net is not None:
+        ramp_from_net(folder, net, link, **numbers)
+    elif extract is not None:
+        ramp_from_osm(folder, extract, link, **numbers)
+    return folder, found(folder)
+
+
+def found(folder: Path) -> list[str]:
+    """What a ramp's `ramp.toml` names, and where it comes from, a line each."""
+    file = read_ramp_file(folder)
+    return [
+        f"main road: {' '.join(file.main)}, host's lanes {' '.join(map(str, file.host_lane))}",
+        f"on-ramp: {' '.join(file.ramp)}, merging lanes {' '.join(map(str, file.merging_lane))}",
+        *(f"{key}: {text}" for key, text in file.sources.items()),
+    ]

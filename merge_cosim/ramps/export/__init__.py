@@ -1,0 +1,1 @@
+"""Ramps and encounters in other formats: CommonRoad."""

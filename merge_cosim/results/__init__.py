@@ -1,0 +1,1 @@
+"""Result rows, their schema, the result folder, and statistics over them."""

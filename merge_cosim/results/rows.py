@@ -1,0 +1,225 @@
+"""From the measures of a run to result rows: one per (scenario, case, method), with a fixed schema."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pyarrow as pa
+
+from merge_cosim.controllers.acc import Acc
+from merge_cosim.core.encounter import NEVER, Encounters, Intention
+from merge_cosim.core.observation import Setting
+from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, time_to_arrival
+from merge_cosim.scoring.decisions import GATES
+from merge_cosim.scoring.scoring import GOAL, KINDS
+from merge_cosim.simulation.loop import Run
+from merge_cosim.simulation.worlds.logged import AROUND
+
+SCHEMA_VERSION = "3"
+SCHEMA = pa.schema(
+    [
+        ("scenario", pa.string()),
+        ("variation", pa.string()),
+        ("site", pa.string()),
+        ("source", pa.string()),
+        ("case", pa.string()),
+        ("car", pa.string()),
+        ("method", pa.string()),
+        ("model", pa.string()),
+        ("failed", pa.bool_()),
+        ("failure_kind", pa.string()),
+        ("censored", pa.bool_()),
+        ("extended", pa.bool_()),
+        ("smoothed_source", pa.bool_()),
+        ("host_reached", pa.bool_()),
+        ("host_first", pa.bool_()),
+        ("order_swapped", pa.bool_()),
+        ("label", pa.string()),
+        ("correct_at_merge", pa.bool_()),
+        ("decision_flips", pa.int32()),
+        ("distance_m", pa.float64()),
+        ("gap_m", pa.float64()),
+        ("min_gap_m", pa.float64()),
+        ("min_ttc_s", pa.float64()),
+        ("max_drac", pa.float64()),
+        ("pet_s", pa.float64()),
+        ("min_leader_gap_m", pa.float64()),
+        ("min_leader_ttc_s", pa.float64()),
+        ("min_follower_gap_m", pa.float64()),
+        ("merging_stopped", pa.bool_()),
+        ("delay_s", pa.float64()),
+        ("hardest_braking", pa.float64()),
+        ("mean_jerk", pa.float64()),
+        ("first_stable_s", pa.float64()),
+        *((f"log_odds_{gate}", pa.float64()) for gate in GATES),
+        *((f"arrival_lead_{gate}", pa.float64()) for gate in GATES),
+        ("human_station_rms_m", pa.float64()),
+        ("human_speed_rms", pa.float64()),
+        ("host_reached_s", pa.float64()),
+        ("merging_reached_s", pa.float64()),
+        ("end_s", pa.float64()),
+        ("ambiguity_s", pa.float64()),
+        ("sumo_collision", pa.bool_()),
+    ],
+    metadata={"merge_cosim_schema": SCHEMA_VERSION},
+)
+KEY = [("scenario", "ascending"), ("variation", "ascending"), ("case", "ascending"), ("method", "ascending")]
+
+
+def result_rows(
+    run: Run,
+    encounters: Encounters,
+    setting: Setting,
+    free_law: Acc,
+    names: dict[str, str],
+    more: Mapping[str, AnyArray | pa.Array] = {},
+) -> pa.Table:
+    """Return the result rows of a run.
+
+    Args:
+        run: The run.
+        encounters: Its n cases.
+        setting: Speed limit and cycle.
+        free_law: The controller whose free driving the delay is measured against.
+        names: `scenario`, `variation`, `method` and `model` of all rows.
+        more: Further columns, or others in their place, shape (n,) each; the columns of scenes are missing without.
+    """
+    c, n, dt = run.columns, len(encounters), setting.dt
+    failed = c["kind"] > 0
+    labelled = encounters.label >= 0
+    decided = c["last_decision"] >= 0
+    correct = labelled & decided & (c["last_decision"] == encounters.label)
+    host_first = _earlier(c["host_reached_s"], c["merging_reached_s"])
+    order_known = ~(np.isnan(c["host_reached_s"]) & np.isnan(c["merging_reached_s"]))
+    if encounters.log is None:
+        last_logged = np.full(n, NEVER)
+        score_until = np.full(n, NEVER)
+    else:
+        last_logged = encounters.log.merging_station.lengths - 1
+        score_until = encounters.log.score_until
+    unfinished = ~failed & ~c["scored_to_end"]
+    columns: dict[str, AnyArray | pa.Array] = {
+        "site": encounters.site,
+        "source": encounters.source,
+        "case": encounters.case,
+        "car": encounters.car,
+        "failed": failed,
+        "failure_kind": np.array(KINDS)[c["kind"].astype(np.int64)],
+        "censored": unfinished & ((c["end_cycle"] >= score_until) | (c["scored_from"] >= 0)),
+        "extended": c["end_cycle"] > last_logged,
+        "smoothed_source": encounters.smoothed_source,
+        "host_reached": ~np.isnan(c["host_reached_s"]) | (encounters.host_station >= 0),
+        "host_first": _masked(host_first, order_known),
+        "order_swapped": _masked(host_first != (encounters.label == Intention.YIELD), order_known & labelled),
+        "label": np.array(["YIELD", "NOT_YIELD", ""])[encounters.label],
+        "correct_at_merge": _masked(correct, labelled & decided),
+        "decision_flips": pa.array(c["decision_flips"], pa.int32(), mask=~decided),
+        "distance_m": _finite(c["distance_m"]),
+        "gap_m": _finite(c["gap_m"]),
+        "min_gap_m": _finite(c["min_gap_m"]),
+        "min_ttc_s": _finite(c["min_ttc_s"]),
+        "max_drac": _masked(c["max_drac"], c["max_drac"] > 0),
+        "pet_s": _finite(post_encroachment(c, encounters, dt)),
+        "delay_s": _delay(c, encounters, setting, free_law),
+        "hardest_braking": c["hardest_braking"],
+        "mean_jerk": _ratio(c["jerk_sum"] / dt, c["end_cycle"] - 1),
+        "first_stable_s": _masked(c["decided_from"] * dt, correct),
+        **{f"log_odds_{gate}": _known(c[f"log_odds_{gate}"]) for gate in GATES},
+        **{f"arrival_lead_{gate}": _known(c[f"arrival_lead_{gate}"]) for gate in GATES},
+        **_human_difference(c, encounters),
+        "host_reached_s": _finite(c["host_reached_s"]),
+        "merging_reached_s": _finite(c["merging_reached_s"]),
+        "end_s": c["end_cycle"] * dt,
+        "ambiguity_s": np.abs(
+            time_to_arrival(encounters.merging_station, encounters.merging_speed)
+            - time_to_arrival(encounters.host_station, encounters.host_speed)
+        ),
+        "sumo_collision": c["sumo_collision"].astype(bool),
+        **{name: _finite(c[name]) for name in AROUND if name in c},
+        **more,
+    }
+    arrays = []
+    for column in SCHEMA:
+        if column.name in names:
+            arrays.append(pa.array([names[column.name]] * n, column.type))
+        elif column.name not in columns:
+            arrays.append(pa.nulls(n, column.type))
+        elif isinstance(columns[column.name], pa.Array):
+            arrays.append(columns[column.name])
+        else:
+            arrays.append(pa.array(columns[column.name], column.type))
+    return pa.Table.from_arrays(arrays, schema=SCHEMA)
+
+
+def free_time(station: FloatArray, speed: FloatArray, setting: Setting, law: Acc) -> FloatArray:
+    """Time [s] to reach station `GOAL` by free driving in steps of dt, the crossing interpolated; 0 if past it."""
+    station, speed = station.copy(), speed.copy()
+    time = np.zeros(len(station))
+    under_way = station < GOAL
+    while under_way.any():
+        faster = np.maximum(speed + law.clip(law.free(speed, setting.speed_limit)) * setting.dt, 0.0)
+        speed = np.where(under_way, faster, speed)
+        step = speed * setting.dt
+        part = np.clip(np.divide(GOAL - station, step, out=np.ones_like(step), where=step > 0), 0.0, 1.0)
+        time += np.where(under_way, part * setting.dt, 0.0)
+        station = np.where(under_way, station + step, station)
+        under_way = station < GOAL
+    return time
+
+
+def _delay(c: dict[str, AnyArray], encounters: Encounters, setting: Setting, law: Acc) -> FloatArray:
+    rest = free_time(c["end_station"], c["end_speed"], setting, law)
+    arrival = np.where(np.isnan(c["goal_s"]), c["end_cycle"] * setting.dt + rest, c["goal_s"])
+    delay: FloatArray = arrival - free_time(encounters.host_station, encounters.host_speed, setting, law)
+    return delay
+
+
+def _earlier(first: FloatArray, second: FloatArray) -> BoolArray:
+    return np.nan_to_num(first, nan=np.inf) < np.nan_to_num(second, nan=np.inf)
+
+
+def post_encroachment(c: Mapping[str, AnyArray], encounters: Encounters, dt: float) -> FloatArray:
+    """Post-encroachment time [s]: from the first car's rear clearing the merging point to the second's front there.
+
+    Where the run ended before the rear was through, it goes on at the first car's last speed, which makes the time
+    negative. NaN where a front never arrives, or the first car was through from the start, or stands on the point.
+    """
+    host = np.where(encounters.host_station >= 0, -np.inf, c["host_reached_s"])
+    merging = np.where(encounters.merging_station >= 0, -np.inf, c["merging_reached_s"])
+    host_second = host >= merging
+    cleared = np.where(host_second, c["merging_cleared_s"], c["host_cleared_s"])
+    rear = np.where(
+        host_second,
+        c["end_merging_station"] - encounters.merging_length,
+        c["end_station"] - encounters.host_length,
+    )
+    speed = np.where(host_second, c["end_merging_speed"], c["end_speed"])
+    left = np.divide(-rear, speed, out=np.full(len(rear), np.nan), where=(speed > 0) & (rear < 0))
+    cleared = np.where(np.isnan(cleared), c["end_cycle"] * dt + left, cleared)
+    return np.where(np.isnan(host + merging), np.nan, np.maximum(host, merging) - cleared)
+
+
+def _human_difference(c: Mapping[str, AnyArray], encounters: Encounters) -> dict[str, pa.Array]:
+    """Root mean square differences to the logged host over the cycles that both drive."""
+    last = np.zeros(len(encounters)) if encounters.log is None else encounters.log.host_station.lengths - 1
+    joint = np.minimum(c["end_cycle"], last)
+    squares = {"human_station_rms_m": c["station_square_sum"], "human_speed_rms": c["speed_square_sum"]}
+    return {name: _ratio(total, joint, root=True) for name, total in squares.items()}
+
+
+def _ratio(total: FloatArray, count: AnyArray, root: bool = False) -> pa.Array:
+    mean = total / np.maximum(count, 1)
+    return _masked(np.sqrt(mean) if root else mean, count > 0)
+
+
+def _masked(values: AnyArray, known: BoolArray) -> pa.Array:
+    return pa.array(values, mask=~known)
+
+
+def _known(values: FloatArray) -> pa.Array:
+    return pa.array(values, pa.float64(), mask=np.isnan(values))
+
+
+def _finite(values: FloatArray) -> pa.Array:
+    return pa.array(values, pa.float64(), mask=~np.isfinite(values))

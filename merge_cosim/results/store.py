@@ -1,0 +1,275 @@
+"""A result folder: parts while a sweep runs, one sorted file, a summary and a manifest when it is done."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import groupby
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.results.rows import KEY, SCHEMA, SCHEMA_VERSION
+
+SCENE_FACTS = b"merge_cosim_scenes"
+"""Metadata of a part: the facts of the scenes that its rows come from (JSON)."""
+SCENES_CSV, TRAFFIC_CSV, NOTES_CSV = "scenes.csv", "traffic.csv", "notes.csv"
+STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV = "strata.csv", "belief.csv", "calibration.csv"
+RESULTS, SUMMARY_CSV, SUMMARY_JSON, MANIFEST, TRACES = (
+    "results.parquet",
+    "summary.csv",
+    "summary.json",
+    "manifest.json",
+    "traces.parquet",
+)
+
+
+STRETCH_ROWS = 100_000
+"""Rows that are sorted and written at a time; more where more cases lie between each other."""
+
+
+class _Part(NamedTuple):
+    """A stored piece: its file, its scenario and variation, and the first of its cases by name."""
+
+    file: Path
+    group: tuple[str, str]
+    first: str
+
+    @classmethod
+    def of(cls, file: Path) -> _Part:
+        rows = pq.read_table(file, columns=["scenario", "variation", "case"])
+        least = {name: pc.min(rows[name]).as_py() for name in rows.column_names}
+        return cls(file, (least["scenario"], least["variation"]), least["case"])
+
+
+class ResultFolder:
+    """The folder that a sweep writes to and a report reads from."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._parts = path / "parts"
+        self._plan = self._parts / "plan.json"
+
+    def begin(self, plan: dict[str, Any], resume: bool) -> None:
+        """Make ready for a sweep; parts of an interrupted one are kept if it was the same and is to be resumed.
+
+        Raises:
+            UserError: There are parts and nothing says what to do with them, or they belong to another sweep.
+        """
+        if self.path.exists() and not self.path.is_dir():
+            raise UserError(f"{self.path}: is a file; --out names a folder")
+        if self._plan.is_file():
+            if not resume:
+                raise UserError(
+                    f"{self.path}: holds an unfinished sweep; if that runs no more, add --resume to finish it, or "
+                    f"choose another --out"
+                )
+            before = _read_json(self._plan)
+            changed = sorted(key for key in plan if plan[key] != before.get(key))
+            if changed:
+                raise UserError(
+                    f"{self.path}: the interrupted sweep was another one ({', '.join(changed)} changed); "
+                    f"repeat its command with --resume, or choose another --out"
+                )
+        self._parts.mkdir(parents=True, exist_ok=True)
+        _write_text(self._plan, json.dumps(plan, indent=1))
+
+    def holds(self, plan: dict[str, Any]) -> bool:
+        """Whether a finished sweep of this plan is here."""
+        if self._plan.is_file() or not (self.path / MANIFEST).is_file():
+            return False
+        manifest = self.read_json(MANIFEST)
+        return all(manifest.get(key) == value for key, value in json.loads(json.dumps(plan)).items())
+
+    def done(self) -> set[str]:
+        """Names of the batches whose parts are there, and can be read."""
+        return {file.stem for file in self._parts.glob("*.parquet") if _is_whole(file)}
+
+    def add(self, name: str, rows: pa.Table) -> None:
+        """Store one batch's rows; after this they survive anything."""
+        _write_table(self._parts / f"{name}.parquet", rows)
+
+    def merge(self, more: Callable[[pa.Table], pa.Table] | None = None) -> None:
+        """Join all parts into one file in the order of `KEY`, holding no more than some parts at a time.
+
+        The parts stay until `finish`.
+
+        Args:
+            more: Makes further rows from the rows of a stretch of cases, of which it gets all methods.
+        """
+        with (
+            _replacing(self.path / RESULTS) as unfinished,
+            pq.ParquetWriter(unfinished, SCHEMA, compression="zstd") as writer,
+        ):
+            for rows in self._stretches():
+                if more is not None:
+                    rows = pa.concat_tables([rows, more(rows)])
+                rows = rows.sort_by(KEY).replace_schema_metadata(SCHEMA.metadata)
+                writer.write_table(rows, row_group_size=len(rows))
+
+    def _stretches(self) -> Iterator[pa.Table]:
+        """All stored rows, scenario by scenario, in stretches of whole cases that follow each other by name."""
+        files = (file for file in self._parts.glob("*.parquet") if pq.read_metadata(file).num_rows)
+        parts = sorted((_Part.of(file) for file in files), key=lambda part: (part.group, part.first, part.file.name))
+        for _, group in groupby(parts, key=lambda part: part.group):
+            held: list[pa.Table] = []
+            members = list(group)
+            for part, after in zip(members, [*members[1:], None], strict=True):
+                held.append(pq.read_table(part.file, schema=SCHEMA))
+                if after is None:
+                    yield pa.concat_tables(held)
+                elif sum(map(len, held)) >= STRETCH_ROWS:
+                    rows = pa.concat_tables(held)
+                    whole = pc.less(rows["case"], after.first)  # no later part has a row of these cases
+                    if pc.any(whole).as_py():
+                        yield rows.filter(whole)
+                        held = [rows.filter(pc.invert(whole))]
+
+    def scenes(self) -> list[dict[str, Any]]:
+        """Facts of the scenes that the stored parts come from, in their order."""
+        found: list[dict[str, Any]] = []
+        for file in sorted(self._parts.glob("*.parquet")):
+            found += json.loads((pq.read_schema(file).metadata or {}).get(SCENE_FACTS, b"[]"))
+        return found
+
+    def traffic(self) -> list[dict[str, Any]]:
+        """Rows of the finished sweep's table of scenes; none where there were no scenes."""
+        return _csv_rows(self.path / TRAFFIC_CSV)
+
+    def note_lines(self) -> list[str]:
+        """What was noted in the scenes, a line for each kind of event."""
+        events: dict[str, list[dict[str, Any]]] = {}
+        for row in _csv_rows(self.path / NOTES_CSV):
+            events.setdefault(row["event"], []).append(row)
+        return [
+            f"{event}: {len(rows)}, such as: {rows[0]['what']} ({rows[0]['scenario']}, {rows[0]['method']}, scene "
+            f"{rows[0]['scene']}); all in {self.path / NOTES_CSV}"
+            for event, rows in events.items()
+        ]
+
+    def groups(self) -> list[tuple[str, str]]:
+        """The scenarios and variations of the merged file, in its order."""
+        seen: dict[tuple[str, str], None] = {}
+        with pq.ParquetFile(self.path / RESULTS) as file:
+            for number in range(file.num_row_groups):
+                names = file.read_row_group(number, columns=["scenario", "variation"])
+                pairs = names.group_by(["scenario", "variation"]).aggregate([]).to_pylist()
+                seen |= dict.fromkeys((pair["scenario"], pair["variation"]) for pair in pairs)
+        return sorted(seen)
+
+    def rows_of(self, scenario: str, variation: str, columns: list[str] | None = None) -> pa.Table:
+        """The merged file's rows of one scenario and variation."""
+        which = [("scenario", "=", scenario), ("variation", "=", variation)]
+        return pq.read_table(self.path / RESULTS, columns=columns, filters=which)
+
+    def write_traces(self, records: pa.Table) -> None:
+        """Write the cycle-by-cycle records of the telling cases."""
+        _write_table(self.path / TRACES, records)
+
+    def traces(self) -> pa.Table:
+        """Read them: scenario, case, method and one row per cycle.
+
+        Raises:
+            UserError: They are missing or damaged.
+        """
+        return _read_table(self.path / TRACES)
+
+    def write_json(self, name: str, document: Any) -> None:
+        """Write one JSON file of the folder."""
+        _write_text(self.path / name, json.dumps(document, indent=1, allow_nan=False) + "\n")
+
+    def finish(self) -> None:
+        """Take the parts away, once everything is written."""
+        for file in [*self._parts.glob("*.parquet"), self._plan]:
+            file.unlink()
+        self._parts.rmdir()
+
+    def results(self) -> pa.Table:
+        """Read the rows of a finished sweep.
+
+        Raises:
+            UserError: There are none, a sweep into this folder is not finished, or another version wrote them.
+        """
+        file = self.path / RESULTS
+        if self._plan.is_file():  # what else is here may be of an earlier sweep
+            raise UserError(f"{self.path}: holds an unfinished sweep; if that runs no more, finish it with --resume")
+        if not file.is_file():
+            raise UserError(f"{file}: no results here; run a sweep first")
+        rows = _read_table(file)
+        version = (rows.schema.metadata or {}).get(b"merge_cosim_schema", b"none").decode()
+        if version != SCHEMA_VERSION:
+            raise UserError(f"{file}: result schema {version}, expected {SCHEMA_VERSION}; run the sweep again")
+        return rows
+
+    def read_json(self, name: str) -> Any:
+        """Read one JSON file of the folder.
+
+        Raises:
+            UserError: It is missing or damaged.
+        """
+        return _read_json(self.path / name)
+
+
+def with_scene_facts(rows: pa.Table, facts: list[dict[str, Any]]) -> pa.Table:
+    """Result rows with the facts of the scenes that they come from, for `ResultFolder.add`."""
+    return rows.replace_schema_metadata({**(SCHEMA.metadata or {}), SCENE_FACTS: json.dumps(facts)})
+
+
+def _csv_rows(file: Path) -> list[dict[str, Any]]:
+    if not file.is_file():
+        return []
+    with file.open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def _is_whole(file: Path) -> bool:
+    try:
+        pq.read_metadata(file)
+    except (pa.ArrowInvalid, OSError):
+        return False
+    return True
+
+
+def _read_table(file: Path) -> pa.Table:
+    try:
+        return pq.read_table(file)
+    except FileNotFoundError:
+        raise UserError(f"{file}: missing; run the sweep again") from None
+    except (pa.ArrowInvalid, OSError) as error:
+        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
+
+
+def _read_json(file: Path) -> Any:
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError(f"{file}: missing; run the sweep again") from None
+    except ValueError as error:
+        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
+
+
+def _write_table(file: Path, rows: pa.Table) -> None:
+    with _replacing(file) as unfinished:
+        pq.write_table(rows, unfinished, compression="zstd")
+
+
+def _write_text(file: Path, text: str) -> None:
+    with _replacing(file) as unfinished:
+        unfinished.write(text.encode())
+
+
+@contextmanager
+def _replacing(file: Path) -> Iterator[BinaryIO]:
+    """A file to write to, which takes the name of `file` once all of it is on the disk."""
+    with file.with_suffix(".tmp").open("wb") as unfinished:
+        yield unfinished
+        unfinished.flush()
+        os.fsync(unfinished.fileno())
+    os.replace(unfinished.name, file)

@@ -1,0 +1,1 @@
+"""Scenario files, the sources of their encounters, and methods by name."""

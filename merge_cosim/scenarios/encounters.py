@@ -1,0 +1,139 @@
+"""From a scenario to its encounters: a grid, random states, or pairs of the user's NGSIM files or of the surrogate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from merge_cosim.core.encounter import Encounters, Intention
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import FloatArray
+from merge_cosim.ngsim.data import data_files, episode_files, load_trajectories
+from merge_cosim.ngsim.pairing.encounters import at_site_point, site_encounters
+from merge_cosim.ngsim.pairing.split import split_cars
+from merge_cosim.ngsim.sites import SITES, site
+from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.scenarios.hidden import hidden_encounters
+from merge_cosim.scenarios.scenario import Scenario
+from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Traffic
+from merge_cosim.sumo.route_reader import read_sumocfg
+
+SourceChoice = Literal["ngsim", "surrogate"]
+
+
+def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice | None) -> Encounters:
+    """Return the scenario's encounters.
+
+    Args:
+        scenario: The scenario.
+        data: Folder with NGSIM files, or None.
+        source: Force real data or the surrogate; None takes real data for each site that has them.
+
+    Raises:
+        UserError: Real data are asked for and absent, or a file is damaged.
+    """
+    if isinstance(scenario.encounters, Grid):
+        return _grid(scenario.encounters)
+    if isinstance(scenario.encounters, Random):
+        return _random(scenario.encounters)
+    if isinstance(scenario.encounters, ByArrival):
+        encounters = hidden_encounters(scenario.encounters)
+        return replace(encounters, label=scenario.merging_car().intentions(encounters))
+    if isinstance(scenario.encounters, Routes):
+        return read_sumocfg(scenario.encounters.file)[1]
+    if isinstance(scenario.encounters, Traffic):
+        raise UserError(f"scenario {scenario.name}: it is living traffic and has no encounters of its own")
+    parts = [
+        _part(pairs_of_site(name, scenario.encounters, data, source), scenario.encounters, part)
+        for name, part in scenario.encounters.sites.items()
+    ]
+    encounters = Encounters.concatenate(parts)
+    if scenario.encounters.merge_point == "site":
+        encounters = at_site_point(encounters)
+    if scenario.is_replay:
+        return encounters
+    nothing = np.full(len(encounters), int(Intention.UNKNOWN))
+    merging_point = np.full(len(encounters), Ramp.load(scenario.ramp).merging_point)
+    return replace(encounters, log=None, label=nothing, merge_position=merging_point)
+
+
+def _part(encounters: Encounters, pairs: Pairs, part: Literal["train", "test", "all"]) -> Encounters:
+    if part == "all":
+        return encounters
+    train = split_cars(encounters, pairs.fraction, pairs.seed, pairs.split)
+    return encounters.take(np.flatnonzero(train if part == "train" else ~train))
+
+
+def pairs_of_site(name: str, pairs: Pairs, data: Path | None, source: SourceChoice | None) -> Encounters:
+    """All pairs of one site, real or surrogate.
+
+    Raises:
+        UserError: Real data are asked for and absent, or the data folder holds nothing of any site, or a damaged file.
+    """
+    real = None if source == "surrogate" or data is None else site_encounters(data, site(name), pairs.rules)
+    if real is not None and not len(real):
+        real = None
+    if real is None and source == "ngsim":
+        where = data or "no data folder (give --data DIR or set MERGE_COSIM_DATA)"
+        raise UserError(f"{where}: no {name} pairs in real NGSIM data; leave out --source ngsim to use the surrogate")
+    if real is None and source is None and data is not None:
+        _refuse_nothing(data)
+    if real is None:
+        folder = surrogate_folder(site(name))
+        real = site_encounters(folder, site(name), pairs.rules, source="surrogate")
+        assert real is not None
+    return real
+
+
+def _refuse_nothing(data: Path) -> None:
+    """Refuse a folder that can stand for no site at all: who names one does not expect the surrogate."""
+    if any(load_trajectories(data, one) is not None for one in SITES) or episode_files(data):
+        return
+    notes = "; ".join(f"{file.path.name}: {file.note}" for file in data_files(data) if file.note)
+    raise UserError(
+        f"{data}: no row of {' or '.join(one.name for one in SITES)} in any NGSIM file there"
+        f"{f' ({notes})' if notes else ''}; leave it out, or add --source surrogate, to use the surrogate"
+    )
+
+
+def _grid(grid: Grid) -> Encounters:
+    axes = (grid.host_offset.values(), grid.host_speed.values(), grid.merging_speed.values())
+    offset, host_speed, merging_speed = (np.array(column) for column in zip(*product(*axes), strict=True))
+    cases = [f"d{d:+g}_h{h:g}_m{m:g}" for d, h, m in zip(offset, host_speed, merging_speed, strict=True)]
+    return _designed(grid, "designed", cases, offset, host_speed, merging_speed)
+
+
+def _random(states: Random) -> Encounters:
+    spans = (states.host_offset, states.host_speed, states.merging_speed)
+    low, width = np.array([(span.first, span.last - span.first) for span in spans]).T
+    shares = np.random.default_rng(states.seed).random((states.count, 3))  # by rows: fewer are the first ones
+    offset, host_speed, merging_speed = (low + width * shares).T.copy()
+    cases = [f"r{number:07d}" for number in range(states.count)]
+    return _designed(states, "random", cases, offset, host_speed, merging_speed)
+
+
+def _designed(
+    states: Grid | Random,
+    source: str,
+    cases: list[str],
+    offset: FloatArray,
+    host_speed: FloatArray,
+    merging_speed: FloatArray,
+) -> Encounters:
+    """Encounters from initial states."""
+    return Encounters.unlogged(
+        np.array(cases),
+        "designed",
+        source,
+        host_station=states.merging_station + offset,
+        host_speed=host_speed,
+        host_length=states.length,
+        merging_station=states.merging_station,
+        merging_speed=merging_speed,
+        merging_length=states.length,
+    )

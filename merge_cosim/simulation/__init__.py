@@ -1,0 +1,1 @@
+"""The co-simulation loop and the worlds that it drives."""

@@ -1,0 +1,1 @@
+"""Worlds: what moves the cars of a simulation."""

@@ -1,0 +1,105 @@
+"""All sweeps behind the papers' tables and figures, run one after the other into one folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from merge_cosim.ngsim.pairing.encounters import site_encounters
+from merge_cosim.ngsim.sites import SITES
+from merge_cosim.ngsim.sites import site as find_site
+from merge_cosim.scenarios.encounters import SourceChoice
+from merge_cosim.studies.training import train
+from merge_cosim.sweeps.sweep import SweepRequest, sweep
+
+NODES = (1, 2, 4, 8, 13, 20, 26, 32, 39, 45, 52, 59, 66, 73, 80, 90, 100, 110, 120)
+"""Numbers of speed nodes that are tried (Dong, Dolan, Litkouhi 2017, failure rate by number of nodes)."""
+DESIGNED, PAIRS, NODE_SWEEP = "designed", "pairs", "nodes"
+MODELS = "models"
+"""Folder of the models that are trained on the way."""
+
+Say = Callable[[int, int, str], None]
+"""Told the cases done, the cases in all and what is being run."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """One sweep of the reproduction.
+
+    Attributes:
+        kind: `designed` (no data), `pairs` (all tests that start from pairs) or `nodes` (number of speed nodes).
+        source: Where its pairs come from; `designed` where there are none. Sources are never mixed.
+        request: The sweep.
+    """
+
+    kind: str
+    source: str
+    request: SweepRequest
+
+    @property
+    def name(self) -> str:
+        """Name of its folder."""
+        return self.kind if self.kind == self.source else f"{self.kind}-{self.source}"
+
+
+def reproduce(data: Path | None, out: Path, jobs: int, seed: int = 0, say: Say | None = None) -> list[Study]:
+    """Train a model per source, run every study into a folder of its own, and return the studies.
+
+    Args:
+        data: Folder with NGSIM files, or None. The surrogate is run in any case.
+        out: Folder to write to.
+        jobs: Processes.
+        seed: Seed of SUMO and of every random stream.
+        say: Told what is going on.
+    """
+    found = studies(data, out, jobs, seed, say)
+    run(found, out, say)
+    return found
+
+
+def run(found: Sequence[Study], out: Path, say: Say | None = None) -> None:
+    """Run studies into folders of their own; a finished one is not run again, an interrupted one goes on."""
+    for number, study in enumerate(found, start=1):
+
+        def tell(done: int, total: int, what: str, lead: str = f"{number}/{len(found)} {study.name}") -> None:
+            if say:
+                say(done, total, f"{lead}: {what}")
+
+        sweep(study.request, out / study.name, resume=True, progress=tell)
+
+
+def studies(data: Path | None, out: Path, jobs: int, seed: int, say: Say | None = None) -> list[Study]:
+    """The sweeps to run: those without data, then those on the surrogate and those on real pairs, each apart."""
+    base = SweepRequest((), data=data, jobs=jobs, seed=seed)
+    found = [Study(DESIGNED, DESIGNED, replace(base, scenarios=("designed-2", "designed-3")))]
+    for source, sites in _sites(data).items():
+        if say:
+            say(0, 1, f"training on us101 ({source})")
+        model = out / MODELS / f"us101-{source}.json"
+        train("us101", data, source, "car", seed, model)
+        here = replace(base, source=source, model=str(model))
+        tests = replace(here, scenarios=(*(f"{site}-replay" for site in sites), "designed-1"))
+        if len(sites) < len(SITES):  # designed-1 takes its initial states from the sites that there are
+            tests = replace(tests, settings={"encounters.sites": {site: PARTS[site] for site in sites}})
+        found.append(Study(PAIRS, source, tests))
+        varied = [("pgm.nodes", NODES)]
+        nodes = replace(here, scenarios=("us101-replay",), methods=("pgm",), variations=varied)
+        found.append(Study(NODE_SWEEP, source, nodes))
+    return found
+
+
+PARTS = {"us101": "test", "i80": "all"}
+"""Which part of each site's pairs is tested: the model is trained on the rest of US-101."""
+
+
+def _sites(data: Path | None) -> dict[SourceChoice, list[str]]:
+    """The sites that each source has pairs of; real ones only with US-101, which the model is trained on."""
+    everywhere = [site.name for site in SITES]
+    real = [name for name in everywhere if data and _has_pairs(name, data)]
+    return {"surrogate": everywhere, "ngsim": real} if "us101" in real else {"surrogate": everywhere}
+
+
+def _has_pairs(name: str, data: Path) -> bool:
+    found = site_encounters(data, find_site(name))
+    return found is not None and len(found) > 0

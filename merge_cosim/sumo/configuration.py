@@ -1,0 +1,191 @@
+"""A SUMO configuration, as SUMO itself reads it: its net, its route files, who is in them."""
+
+from __future__ import annotations
+
+import gzip
+import math
+import os
+import subprocess
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import sumolib
+from lxml import etree
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import did_you_mean
+from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
+from merge_cosim.sumo.routes import ROLE
+
+DEMAND = ("vehicle", "trip", "flow", "person", "personFlow", "container", "containerFlow")
+"""Elements that put something into the simulation."""
+TYPES = ("vType", "vTypeDistribution")
+"""Elements that say of which kind a vehicle is."""
+DEFAULT_TYPE = "DEFAULT_VEHTYPE"
+"""SUMO's own passenger car."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A `.sumocfg`, as far as we need to know it.
+
+    Attributes:
+        file: The file.
+        net: Its net, beside which lies a `ramp.toml`.
+        routes: Its route files.
+        additional: Its additional files.
+        begin: Its begin [s].
+        end: Its end [s]; inf if it does not say.
+    """
+
+    file: Path
+    net: Path
+    routes: tuple[Path, ...]
+    additional: tuple[Path, ...]
+    begin: float
+    end: float
+
+    @classmethod
+    def read(cls, file: Path) -> Configuration:
+        """Read it.
+
+        Raises:
+            UserError: A file is missing, SUMO refuses the configuration, or the net is not that of a ramp.
+        """
+        if not file.is_file():
+            raise UserError(f"{file}: no such file")
+        options = dict(_options(file.absolute(), file.stat().st_mtime_ns, str(file)))
+        nets, routes, additional = (
+            tuple(file.parent / os.path.expandvars(name.strip()) for name in options.get(key, "").split(",") if name)
+            for key in ("net-file", "route-files", "additional-files")
+        )
+        for key, files in (("net-file", nets), ("route-files", routes or additional)):
+            if not files:
+                raise UserError(f"{file}: no <{key} value=.../>")
+        if options.get("mesosim") == "true":
+            raise UserError(f"{file}: mesosim: SUMO's mesoscopic model has no lanes to merge between; leave it out")
+        for each in (*nets, *routes, *additional):
+            if not each.is_file():
+                raise UserError(f"{file}: {each}: no such file")
+        _require_ramp(file, nets[0])
+        end = _seconds(options.get("end", "-1"), file)
+        return cls(
+            file, nets[0], routes, additional, _seconds(options.get("begin", "0"), file), end if end >= 0 else math.inf
+        )
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All of them."""
+        return (self.file, self.net, *self.routes, *self.additional)
+
+    def vehicles(self) -> Iterator[etree._Element]:
+        """Everything in the files that puts a vehicle or a person in."""
+        return self._elements(*DEMAND)
+
+    def names_role(self, role: str) -> bool:
+        """Whether any vehicle or type has the role."""
+        return any(one.get("key") == ROLE and one.get("value") == role for one in self._elements("param"))
+
+    def hosts(self, host: str) -> tuple[str, ...]:
+        """Ids of the vehicles and flows that are hosts whatever their route: by their role, or `host` by itself."""
+        types = {kind.get("id") for kind in self._elements("vType") if _is_host(kind)}
+        return tuple(
+            one.get("id", "")
+            for one in self._elements("vehicle", "trip", "flow")
+            if _is_host(one) or one.get("type") in types or (one.tag != "flow" and one.get("id") == host)
+        )
+
+    def require(self, host: str) -> None:
+        """Refuse a host's name that stands nowhere in the files.
+
+        Args:
+            host: Id of a vehicle, a flow or a type.
+
+        Raises:
+            UserError: It does not, or it is that of several types.
+        """
+        ids = {element.get("id", ""): element.tag for element in self._elements(*DEMAND, *TYPES)}
+        if ids.get(host) == "vTypeDistribution":
+            members = [one for one in self._elements("vTypeDistribution") if one.get("id") == host]
+            named = [each.get("id", "") for one in members for each in one.iter("vType")]
+            named += [name for one in members for name in one.get("vTypes", "").split()]
+            raise UserError(
+                f"{self.file}: host = '{host}': it stands for several types; choose one: {', '.join(named)}"
+            )
+        if host in ids or host == DEFAULT_TYPE or host.rpartition(".")[0] in ids:
+            return
+        raise UserError(
+            f"{self.file}: host = '{host}': no vehicle, flow or type of its files has this id"
+            f"{did_you_mean(host, [name for name, tag in ids.items() if tag in ('flow', 'vType')][:20])}"
+        )
+
+    def _elements(self, *tags: str) -> Iterator[etree._Element]:
+        for file in (*self.routes, *self.additional):
+            yield from parse(file).iter(*tags)
+
+
+def parse(file: Path) -> etree._Element:
+    """Root of an XML file, which may be compressed with gzip; files that it includes stand in their places.
+
+    Raises:
+        UserError: A file is missing or no XML.
+    """
+    try:
+        content = gzip.decompress(file.read_bytes()) if file.suffix == ".gz" else file.read_bytes()
+        root = etree.fromstring(content, etree.XMLParser(huge_tree=True))
+    except FileNotFoundError:
+        raise UserError(f"{file}: no such file") from None
+    except (etree.XMLSyntaxError, OSError, EOFError, zlib.error) as error:
+        raise UserError(f"{file}: not XML: {error}") from None
+    for include in list(root.iter("include")):
+        parent = include.getparent()
+        if parent is not None:
+            parent.replace(include, parse(file.parent / include.get("href", "")))
+    return root
+
+
+def _is_host(element: etree._Element) -> bool:
+    return any(one.get("key") == ROLE and one.get("value") == "host" for one in element.iter("param"))
+
+
+@lru_cache(maxsize=8)
+def _options(file: Path, changed: int, named: str) -> tuple[tuple[str, str], ...]:
+    """The options of a configuration by SUMO's long names: SUMO knows several names of each.
+
+    Args:
+        file: The configuration.
+        changed: When it was changed last, so that it is read again.
+        named: What error lines call it.
+    """
+    # SUMO runs beside the file, so that relative names come back as they stand there.
+    command = [sumolib.checkBinary("sumo"), "-c", file.name, "--save-configuration", "-"]
+    done = subprocess.run(command, cwd=file.parent, capture_output=True, check=False)
+    if done.returncode:
+        lines = done.stderr.decode(errors="replace").splitlines()
+        reason = " ".join(line.removeprefix("Error: ").strip() for line in lines if "Quitting" not in line)
+        raise UserError(f"{named}: SUMO cannot read it: {reason or 'no reason given'}")
+    root = etree.fromstring(done.stdout[done.stdout.index(b"<?xml") :])
+    return tuple((str(one.tag), one.get("value", "")) for one in root.iter(etree.Element) if "value" in one.attrib)
+
+
+def _require_ramp(file: Path, net: Path) -> None:
+    """Refuse a net that is not that of a ramp."""
+    if not (net.parent / FILE_NAME).is_file():
+        raise UserError(
+            f"{file}: no {FILE_NAME} beside its net says where the on-ramp is; write one with: "
+            f"merge-cosim ramp describe {net}"
+        )
+    own = net.parent / read_ramp_file(net.parent).net
+    if own.name != net.name and own.is_file():
+        raise UserError(f"{file}: {net.parent / FILE_NAME} is that of {own.name}, not of the net {net.name}")
+
+
+def _seconds(text: str, file: Path) -> float:
+    """A time of SUMO [s]: seconds, or [days:]hours:minutes:seconds."""
+    try:
+        return float(sumolib.miscutils.parseTime(text))
+    except ValueError:
+        raise UserError(f"{file}: '{text}' is no time") from None

@@ -1,0 +1,104 @@
+"""One encounter as ordinary SUMO files: to be shown in sumo-gui, or kept and changed by hand."""
+
+import shutil
+from pathlib import Path
+
+from lxml import etree
+
+from merge_cosim.core.encounter import Encounters
+from merge_cosim.core.units import DT
+from merge_cosim.ramps.definition import FILE_NAME
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.view import FILE_NAME as VIEW
+from merge_cosim.ramps.view import copy_view
+
+ROLE = "merge-cosim.role"
+"""Parameter of a vehicle type: `host` or `merging`."""
+MERGE_POSITION = "merge-cosim.merge-position"
+"""Parameter of the merging car's type: where its station 0 lies, in m past the gore."""
+
+COLORS = {"host": "40,160,60", "merging": "210,50,40"}
+"""As in the papers' figures."""
+
+
+def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) -> Path:
+    """Write net, ramp, routes and configuration of one encounter into a folder and return the `.sumocfg`.
+
+    Left alone, SUMO drives both cars by its own models; the initial state is the encounter's.
+
+    Raises:
+        UserError: The encounter starts off the net.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for file in (ramp.net, ramp.net.parent / FILE_NAME):
+        shutil.copyfile(file, folder / file.name)
+    merge_position = float(encounters.merge_position[row])
+    states = {
+        "host": (encounters.host_station, encounters.host_speed, encounters.host_length),
+        "merging": (encounters.merging_station, encounters.merging_speed, encounters.merging_length),
+    }
+    types, cars = [], []
+    for role, (station, speed, length) in states.items():
+        where = ramp.place("main" if role == "host" else "ramp", float(station[row]), merge_position)
+        route = ramp.main_route if role == "host" else ramp.ramp_route
+        parameters = {ROLE: role} | ({MERGE_POSITION: _number(merge_position)} if role == "merging" else {})
+        look = {"length": _number(length[row]), "color": COLORS[role]}
+        types.append(
+            element(
+                "vType",
+                {"id": role, **look, "minGap": "0", "sigma": "0", "speedDev": "0"},
+                *(element("param", {"key": key, "value": value}) for key, value in parameters.items()),
+            )
+        )
+        start = {
+            "departLane": str(where.lane),
+            "departPos": _number(where.position),
+            "departSpeed": _number(speed[row]),
+        }
+        cars.append(
+            element(
+                "vehicle",
+                {"id": role, "type": role, "depart": "0", **start, "insertionChecks": "none"},
+                element("route", {"edges": " ".join(route[route.index(where.edge) :])}),
+            )
+        )
+    write_xml(folder / "encounter.rou.xml", element("routes", {}, *types, *cars))
+    inputs = {"net-file": ramp.net.name, "route-files": "encounter.rou.xml"}
+    write_xml(folder / "encounter.sumocfg", configuration(inputs, {}, copy_view(ramp.net.parent, folder), {}))
+    return folder / "encounter.sumocfg"
+
+
+def configuration(
+    inputs: dict[str, str], processing: dict[str, str], with_view: bool, time: dict[str, str]
+) -> etree._Element:
+    """A SUMO configuration with our conditions; further options by section."""
+    options = {
+        "input": inputs,
+        "gui_only": {"gui-settings-file": VIEW} if with_view else {},
+        "time": {"begin": "0", **time, "step-length": _number(DT)},
+        "processing": {
+            "time-to-teleport": "-1",
+            "collision.action": "warn",
+            "no-internal-links": "true",
+            **processing,
+        },
+    }
+    parts = [element(part, {}, *(element(k, {"value": v}) for k, v in of.items())) for part, of in options.items()]
+    return element("configuration", {}, *parts)
+
+
+def element(tag: str, attributes: dict[str, str], *children: etree._Element) -> etree._Element:
+    """An XML element with its children."""
+    element = etree.Element(tag, attributes)
+    element.extend(children)
+    return element
+
+
+def _number(value: float) -> str:
+    """A number as XML text, without loss."""
+    return repr(float(value))
+
+
+def write_xml(path: Path, root: etree._Element) -> None:
+    """Write an XML file."""
+    path.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))

@@ -1,0 +1,123 @@
+"""Many copies of a ramp side by side in one net, so that one SUMO steps a batch of encounters."""
+
+import gzip
+import hashlib
+from copy import deepcopy
+from pathlib import Path
+
+from lxml import etree
+
+from merge_cosim.core.files import cache_folder, write_atomically
+from merge_cosim.ramps.ramp import Ramp
+
+SPACING = 30.0
+"""Free room between two tiles [m], for the eye only: tiles share no node."""
+
+_REFERENCES = ("id", "from", "to", "incLanes")
+"""Attributes that hold one id or several, and so get the tile's prefix."""
+
+
+def tile_id(tile: int, name: str) -> str:
+    """Id of the copy of an edge, lane or junction in tile number `tile`."""
+    return f"t{tile}.{name}"
+
+
+def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
+    """Return a net with `count` unconnected copies of a ramp, from the cache or newly made.
+
+    Every id carries the prefix of `tile_id`. A copy holds only what an encounter can use, because SUMO's step costs
+    twice as much on a six-lane road: the edges of the two paths, and on them no lane further left than the leftmost
+    that a path uses. It has no internal links, so that a path's length is the sum of its edges' lengths, and no right
+    of way.
+
+    Args:
+        ramp: The ramp to copy.
+        count: Number of tiles, at least 1.
+        whole: Keep all edges and lanes, and the right of way, for a scene with other traffic.
+    """
+    source = ramp.net.read_bytes()
+    ingredients = source + repr((ramp.main, ramp.ramp, count, whole)).encode() + Path(__file__).read_bytes()
+    key = hashlib.sha256(ingredients).hexdigest()[:16]
+    target = cache_folder("tiles") / f"{ramp.name}-{count}-{key}.net.xml"
+    if not target.is_file():
+        text = gzip.decompress(source) if ramp.net.suffix == ".gz" else source
+        net = etree.fromstring(text, etree.XMLParser(remove_blank_text=True, remove_comments=True))
+        _leave_out_internal(net)
+        if not whole:
+            _reduce(net, ramp)
+        _multiply(net, count)
+        write_atomically(target, etree.tostring(net, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+    return target
+
+
+def _leave_out_internal(net: etree._Element) -> None:
+    """Take out of a net the lanes inside junctions."""
+    for kind in ("edge", "junction", "connection"):
+        for part in net.findall(kind):
+            if (part.get("id") or part.get("from") or "").startswith(":"):  # so SUMO calls what lies in a junction
+                net.remove(part)
+    for node in net.findall("junction"):
+        node.set("intLanes", "")
+    for link in net.findall("connection"):
+        link.attrib.pop("via", "")
+
+
+def _reduce(net: etree._Element, ramp: Ramp) -> None:
+    """Take out of a net what no car of an encounter uses."""
+    leftmost: dict[str, int] = {}
+    for section in ramp.main + ramp.ramp:
+        leftmost[section.edge] = max(section.lane, leftmost.get(section.edge, 0))
+    lanes, nodes = set(), set()
+    for edge in net.findall("edge"):
+        last = leftmost.get(edge.get("id", ""))
+        if last is None:
+            net.remove(edge)
+            continue
+        nodes |= {edge.get("from"), edge.get("to")}
+        for lane in edge.findall("lane"):
+            if int(lane.get("index", "")) > last:
+                edge.remove(lane)
+                continue
+            lanes.add(lane.get("id"))
+    for node in net.findall("junction"):
+        if node.get("id") not in nodes:
+            net.remove(node)
+            continue
+        node.set("incLanes", " ".join(lane for lane in node.get("incLanes", "").split() if lane in lanes))
+        if node.get("type") != "dead_end":
+            node.set("type", "unregulated")
+        for request in node.findall("request"):
+            node.remove(request)
+    for link in net.findall("connection"):
+        ends = {f"{link.get('from')}_{link.get('fromLane')}", f"{link.get('to')}_{link.get('toLane')}"}
+        if not ends <= lanes:
+            net.remove(link)
+
+
+def _multiply(net: etree._Element, count: int) -> None:
+    """Put `count` copies of a net's content in its place, side by side."""
+    location = net.find("location")
+    assert location is not None
+    west, south, east, north = map(float, location.get("convBoundary", "").split(","))
+    pitch = north - south + SPACING
+    location.set("convBoundary", f"{west:.2f},{south:.2f},{east:.2f},{north + (count - 1) * pitch:.2f}")
+    parts = [element for element in net if element is not location]
+    for element in parts:
+        net.remove(element)
+    for tag in ("edge", "junction", "connection"):
+        like = [element for element in parts if element.tag == tag]
+        net.extend(_shifted(deepcopy(element), tile, tile * pitch) for tile in range(count) for element in like)
+
+
+def _shifted(element: etree._Element, tile: int, offset: float) -> etree._Element:
+    """Give an element and its children a tile's prefix and move them by `offset` [m] in y."""
+    for part in element.iter():
+        for name in _REFERENCES:
+            if words := part.get(name):
+                part.set(name, " ".join(tile_id(tile, word) for word in words.split()))
+        if shape := part.get("shape"):
+            points = (point.split(",") for point in shape.split())
+            part.set("shape", " ".join(",".join([x, f"{float(y) + offset:.2f}", *z]) for x, y, *z in points))
+        if y := part.get("y"):
+            part.set("y", f"{float(y) + offset:.2f}")
+    return element

@@ -1,0 +1,1 @@
+"""Sweeps: plan, tasks, executors, resuming."""

@@ -1,0 +1,213 @@
+"""Executors: where the chunks of a sweep are run. All of them give the same rows."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import threading
+import traceback
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import BaseContext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import pyarrow as pa
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import load_plugin
+from merge_cosim.simulation.loop import Effort
+from merge_cosim.sweeps.chunks import Chunk, ChunkQueue
+from merge_cosim.sweeps.task import WorkerSession
+
+if TYPE_CHECKING:  # a worker process plans nothing, and need not import what planning needs
+    from merge_cosim.sweeps.plan import StartMethod, SweepRequest
+
+MOST_LOSSES = 3
+"""Workers that one chunk may lose before the sweep gives up on it."""
+
+
+class Finished(NamedTuple):
+    """A chunk that has been run."""
+
+    chunk: Chunk
+    rows: pa.Table
+    effort: Effort
+
+
+class Executor(Protocol):
+    """Runs chunks somewhere."""
+
+    def run(self, queue: ChunkQueue) -> Iterator[Finished]:
+        """Run all chunks of `queue` and yield each as soon as it is done, in any order.
+
+        Raises:
+            UserError: There is no place to run them, or a chunk cannot be run.
+        """
+
+
+def executor_for(request: SweepRequest, chunks: int) -> Executor:
+    """The executor that a request asks for; a single process needs no other."""
+    if request.dask is not None:
+        from merge_cosim.sweeps.dask_executor import Cluster
+
+        return Cluster(request.dask, request.jobs, request.plugins)
+    jobs = min(request.jobs, chunks)
+    return Processes(jobs, request.plugins, request.start) if jobs > 1 else InProcess()
+
+
+class InProcess:
+    """Runs the chunks in this process, one after the other."""
+
+    def run(self, queue: ChunkQueue) -> Iterator[Finished]:
+        """See `Executor`."""
+        worker_session = WorkerSession()
+        try:
+            while chunk := queue.take():
+                yield Finished(chunk, *chunk.task().run(worker_session))
+        finally:
+            worker_session.close()
+
+
+class Processes:
+    """Runs the chunks in processes of this machine, each with a SUMO of its own.
+
+    Every worker holds one chunk at a time and has its own pipe, so one that is killed takes no other with it: its chunk
+    goes to a new worker. (The pool of the standard library breaks as a whole.)
+
+    `spawn` starts every worker as a fresh interpreter, which is safe everywhere. `fork` copies this process, which
+    spares a worker its imports; it is refused where threads run, which a copy would not have.
+    """
+
+    def __init__(self, jobs: int, plugins: Sequence[Path] = (), start: StartMethod = "spawn") -> None:
+        if start not in multiprocessing.get_all_start_methods():
+            raise UserError(f"--start {start}: this system cannot; use --start spawn")
+        if start == "fork" and threading.active_count() > 1:
+            raise UserError("--start fork: this process runs threads, which a fork would break; use --start spawn")
+        self._jobs = jobs
+        self._plugins = tuple(plugins)
+        self._context = multiprocessing.get_context(start)
+
+    def run(self, queue: ChunkQueue) -> Iterator[Finished]:
+        """See `Executor`."""
+        losses: Counter[str] = Counter()
+        workers: dict[Connection, _Worker] = {}
+        try:
+            for _ in range(min(self._jobs, len(queue))):
+                self._employ(queue.take(), workers)
+            while busy := [connection for connection, worker in workers.items() if worker.chunk]:
+                for connection in wait(busy):
+                    assert isinstance(connection, Connection)
+                    worker = workers[connection]
+                    chunk = worker.chunk
+                    assert chunk is not None
+                    try:
+                        outcome = connection.recv()
+                    except (EOFError, OSError):
+                        del workers[connection]
+                        losses[chunk.name] += 1
+                        if losses[chunk.name] == MOST_LOSSES:
+                            raise UserError(_lost(chunk, worker)) from None
+                        worker.stop()
+                        self._employ(chunk, workers)
+                        continue
+                    if isinstance(outcome, BaseException):
+                        raise outcome
+                    worker.begin(queue.take())  # before its rows are stored, so that it need not wait for that
+                    yield Finished(chunk, *outcome)
+        finally:
+            for worker in workers.values():
+                worker.stop()
+
+    def _employ(self, chunk: Chunk | None, workers: dict[Connection, _Worker]) -> None:
+        worker = _Worker(self._context, self._plugins)
+        workers[worker.connection] = worker
+        worker.begin(chunk)
+
+
+class _Worker:
+    """A worker process, as its employer sees it."""
+
+    def __init__(self, context: BaseContext, plugins: tuple[Path, ...]) -> None:
+        self.connection, there = context.Pipe()
+        self.chunk: Chunk | None = None
+        forked = context.get_start_method() == "fork"
+        inherited = self.connection if forked else None
+        self.process: Any = context.Process(  # type: ignore[attr-defined]
+            target=_serve, args=(there, inherited, plugins), name="merge-cosim worker", daemon=True
+        )
+        with interrupts_ignored():
+            self.process.start()
+        there.close()
+
+    def begin(self, chunk: Chunk | None) -> None:
+        self.chunk = chunk
+        if chunk is not None:
+            with suppress(OSError):  # it is dead; reading from it will say so
+                self.connection.send(chunk.task())
+
+    def stop(self) -> None:
+        """End the process: at once if it is at work, else by its own will."""
+        if self.chunk is not None:
+            self.process.terminate()
+        else:
+            with suppress(OSError):
+                self.connection.send(None)
+        self.connection.close()
+        self.process.join()
+
+
+@contextmanager
+def interrupts_ignored() -> Iterator[None]:
+    """Processes that begin here do not hear Ctrl-C: their employer decides what it means, and hears it afterwards."""
+    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
+        yield  # Windows has no masks, and no other thread is interrupted
+        return
+    heard: list[int] = []
+    resource_tracker.ensure_running()  # would be started along with the first process, and make it hear again
+    handler = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))  # for threads without the mask
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+        if heard:
+            signal.raise_signal(signal.SIGINT)
+
+
+def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
+    """What a worker process does: run what comes through the pipe, until that is None or nobody is there any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the employer decides what an interrupt means
+    if inherited is not None:
+        inherited.close()  # else the worker would never see that the employer has gone
+    worker_session = WorkerSession()
+    try:
+        for plugin in plugins:
+            load_plugin(plugin)
+        while (task := employer.recv()) is not None:
+            outcome: object
+            try:
+                outcome = task.run(worker_session)
+            except Exception as error:
+                if not isinstance(error, UserError):  # the traceback, say of a user's own file, stays behind
+                    error.add_note(f"In a worker process:\n{traceback.format_exc()}")
+                outcome = error
+            employer.send(outcome)
+    except (EOFError, OSError):  # the employer was killed
+        pass
+    finally:
+        worker_session.close()
+
+
+def _lost(chunk: Chunk, worker: _Worker) -> str:
+    worker.process.join()
+    code = worker.process.exitcode
+    end = f"by signal {-code}" if code < 0 else f"with status {code}"
+    return (
+        f"{chunk}: {MOST_LOSSES} worker processes in a row died while running these cases, the last one {end} "
+        f"(9: killed, as for want of memory); what was finished is kept, go on with --resume, perhaps with fewer --jobs"
+    )

@@ -1,0 +1,266 @@
+"""From what the user asked for to what there is to run: one task per (scenario, variation, method)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from merge_cosim.core.encounter import Encounters
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import load_plugin
+from merge_cosim.core.units import IntArray
+from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.results.statistics.comparison import reference_of
+from merge_cosim.results.statistics.summary import TRAFFIC
+from merge_cosim.scenarios.encounters import SourceChoice, load_encounters
+from merge_cosim.scenarios.methods import (
+    CONSTANT,
+    ORACLE_BEST,
+    Method,
+    default_methods,
+    methods_for,
+    split_settings,
+)
+from merge_cosim.scenarios.scenario import Scenario, load_scenario
+from merge_cosim.scenarios.sources import Routes, Traffic
+from merge_cosim.sumo.configuration import Configuration
+from merge_cosim.sumo.routes import ROLE
+from merge_cosim.sweeps.full_scene_task import SceneReplay, load_scenes
+from merge_cosim.sweeps.scene_task import SceneBatch
+from merge_cosim.sweeps.task import FREE_LAW, Batch, Task
+
+StartMethod = Literal["spawn", "fork"]
+
+
+@dataclass(frozen=True)
+class SweepRequest:
+    """What the user asked for.
+
+    Attributes:
+        scenarios: Names or files.
+        methods: Names; empty for all that there are.
+        model: Model file or name; None for the one that goes with each scenario's source.
+        settings: Values of scenario keys and of component parameters.
+        variations: One name and its values each, varied one at a time.
+        data: Folder with NGSIM files.
+        source: Force real data or the surrogate.
+        seed: SUMO's seed.
+        plugins: Files with the user's own components.
+        jobs: Processes.
+        start: How processes come to be, see `executors.Processes`.
+        dask: Address of a Dask scheduler, or `local`; None for processes of this machine.
+        against: Method that the others are compared with on the same cases; None for pgm, if it is there.
+    """
+
+    scenarios: Sequence[str]
+    methods: Sequence[str] = ()
+    model: str | None = None
+    settings: dict[str, Any] = field(default_factory=dict)
+    variations: Sequence[tuple[str, Sequence[Any]]] = ()
+    data: Path | None = None
+    source: SourceChoice | None = None
+    seed: int = 0
+    plugins: Sequence[Path] = ()
+    jobs: int = 1
+    start: StartMethod = "spawn"
+    dask: str | None = None
+    against: str | None = None
+
+
+def plan(request: SweepRequest) -> list[Task]:
+    """Work out what to run, one task per (scenario, variation, method); all mistakes of the user show here.
+
+    In whatever order the user names scenarios and methods, the tasks come in the same one: a resumed sweep knows its
+    chunks by their numbers.
+
+    Raises:
+        UserError: Something asked for does not exist or does not fit.
+    """
+    for plugin in request.plugins:
+        load_plugin(plugin)
+    loaded: dict[str, Encounters] = {}
+    tasks: list[Task] = []
+    labels: set[str] = set()
+    for varied, values in [("", [None]), *request.variations]:
+        for value in values:
+            label = f"{varied}={value}" if varied else ""
+            if label in labels:  # asked for twice
+                continue
+            labels.add(label)
+            settings = request.settings | ({varied: value} if varied else {})
+            of_scenario, of_components = split_settings(settings)
+            methods = _methods(request.methods, of_components)
+            if varied in of_components:
+                methods = [one for one in methods if varied.partition(".")[0] in (one.estimator, one.controller)]
+            _refuse_unused(of_components, methods)
+            for scenario in _scenarios(request.scenarios, of_scenario, varied):
+                if scenario.is_scene:
+                    tasks += _scene_batches(scenario, label, methods, request)
+                    continue
+                key = scenario.encounters_key
+                if key not in loaded:
+                    loaded[key] = _by_name(load_encounters(scenario, request.data, request.source))
+                tasks += _encounter_batches(scenario, label, methods, loaded[key], request)
+    if not tasks:
+        raise UserError("nothing to run: no method fits the scenarios")
+    reference_of(method_names(request, tasks), request.against)
+    return sorted(tasks, key=lambda task: (task.scenario.name, task.variation, task.method.name))
+
+
+def plan_encounters(request: SweepRequest) -> list[Batch]:
+    """The same for what needs encounters.
+
+    Raises:
+        UserError: See `plan`; or a scenario is living traffic.
+    """
+    tasks = plan(request)
+    for task in tasks:
+        if not isinstance(task, Batch):
+            raise UserError(f"scenario {task.scenario.name}: it is living traffic and has no encounters of its own")
+    return [task for task in tasks if isinstance(task, Batch)]
+
+
+def method_names(request: SweepRequest, tasks: Sequence[Task]) -> list[str]:
+    """Names of all methods that will have rows."""
+    derived = {ORACLE_BEST} if not request.methods or ORACLE_BEST in request.methods else set()
+    return sorted({task.method.name for task in tasks} | derived)
+
+
+def _scenarios(names: Sequence[str], settings: dict[str, Any], varied: str) -> list[Scenario]:
+    """Load the scenarios; one that does not know what is varied is left as it is, if another does."""
+    loaded, refused = {}, []
+    for name in dict.fromkeys(names):
+        try:
+            scenario = load_scenario(name, settings)
+            if scenario.name in loaded:
+                raise UserError(f"{name}: another scenario is called '{scenario.name}', too; rename the file")
+            loaded[scenario.name] = scenario
+        except UserError as error:
+            if varied not in settings:
+                raise
+            refused.append(error)
+    if not loaded:
+        raise refused[0]
+    return list(loaded.values())
+
+
+def _methods(names: Sequence[str], settings: dict[str, Any]) -> list[Method]:
+    wanted = list(dict.fromkeys(names or default_methods()))
+    if ORACLE_BEST in wanted:
+        wanted = list(dict.fromkeys([*(name for name in wanted if name != ORACLE_BEST), *CONSTANT]))
+    return [Method.parse(name, settings) for name in wanted]
+
+
+def _refuse_unused(settings: dict[str, Any], methods: Sequence[Method]) -> None:
+    """Refuse parameters of what no method consists of; those of acc are also in the law that delays are measured by."""
+    parts = {part for method in methods for part in (method.estimator, method.controller)}
+    for name in settings:
+        owner = name.partition(".")[0]
+        if owner not in parts and (owner != FREE_LAW or not methods):
+            raise UserError(f"{name}: no method of this sweep consists of '{owner}'; leave it out, or add --method")
+
+
+def _scene_batches(
+    scenario: Scenario, variation: str, methods: list[Method], request: SweepRequest
+) -> Iterator[SceneBatch]:
+    traffic = scenario.encounters
+    assert isinstance(traffic, (Routes, Traffic))
+    if isinstance(traffic, Routes):
+        if request.dask is not None:
+            raise UserError(f"{traffic.file}: route files with traffic run on this machine; leave out --dask")
+        configuration = Configuration.read(traffic.file)
+        if traffic.host:
+            configuration.require(traffic.host)
+        elif not configuration.names_role("host"):
+            raise UserError(
+                f'{traffic.file}: nobody is the host; add <param key="{ROLE}" value="host"/> to a vType, or name a '
+                f"vehicle or type: --set encounters.host=ID"
+            )
+    for method in methods:
+        if method.is_human or method.needs_label:
+            continue
+        yield SceneBatch(
+            scenario=scenario,
+            variation=variation,
+            method=method,
+            model=_model(method, TRAFFIC, request),
+            seed=request.seed,
+            first=0,
+            last=traffic.replications,
+        )
+
+
+def _model(method: Method, source: str, request: SweepRequest) -> IntentionModel | None:
+    """The learned model that a method needs; it is found to fit."""
+    if not method.needs_model:
+        return None
+    model = IntentionModel.load(request.model or default_model(source))
+    method.driver(model)
+    return model
+
+
+def _encounter_batches(
+    scenario: Scenario, variation: str, methods: list[Method], encounters: Encounters, request: SweepRequest
+) -> Iterator[Batch]:
+    encounters, left_out = _on_the_ramp(scenario, encounters)
+    for source in dict.fromkeys(encounters.source.tolist()):
+        chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
+        scenes = None if scenario.full_scene is None else load_scenes(scenario, source, request.data)
+        for method in methods_for(chosen, methods):
+            model = _model(method, source, request)
+            if model is not None:
+                _refuse_trained(scenario, chosen, model)
+            batch = Batch(
+                scenario=scenario,
+                variation=variation,
+                method=method,
+                model=model,
+                encounters=chosen,
+                seed=request.seed,
+                left_out=left_out,
+            )
+            yield batch if scenes is None else SceneReplay.of(batch, scenes)
+
+
+def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:
+    """The encounters that the ramp has room for, and the names of the others."""
+    ramp = Ramp.load(scenario.ramp)
+    fits = ramp.holds(encounters.merge_position, encounters.host_station, encounters.merging_station)
+    if not fits.any():
+        merge_position = float(encounters.merge_position[0])
+        ramp.place("main", float(encounters.host_station[0]), merge_position)
+        ramp.place("ramp", float(encounters.merging_station[0]), merge_position)
+    return _taken(encounters, np.flatnonzero(fits)), tuple(encounters.case[~fits].tolist())
+
+
+def _by_name(encounters: Encounters) -> Encounters:
+    """Sorted as results are stored, so that a part of a sweep holds a stretch of the stored rows."""
+    if (encounters.case[:-1] <= encounters.case[1:]).all():
+        return encounters
+    return encounters.take(np.argsort(encounters.case, kind="stable"))
+
+
+def _taken(encounters: Encounters, rows: IntArray) -> Encounters:
+    """The chosen encounters; no copy where that is all of them."""
+    return encounters if len(rows) == len(encounters) else encounters.take(rows)
+
+
+def default_model(source: str) -> str:
+    """Name of the project's own model for encounters of a source."""
+    return "us101-surrogate" if source == "surrogate" else "us101-ngsim"
+
+
+def _refuse_trained(scenario: Scenario, encounters: Encounters, model: IntentionModel) -> None:
+    if not scenario.is_replay or model.source != str(encounters.source[0]):
+        return
+    known = sorted(set(encounters.car.tolist()) & set(model.trained_on))
+    if known:
+        raise UserError(
+            f"scenario {scenario.name}: model {model.name} was trained on {len(known)} of its merging cars "
+            f"(such as {known[0]}); choose another --model or split"
+        )

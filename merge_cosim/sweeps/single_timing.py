@@ -1,0 +1,61 @@
+"""A few cases of a sweep run one at a time: to time a method in a batch of one, and to record one case."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.results.store import ResultFolder
+from merge_cosim.simulation.loop import Effort
+from merge_cosim.sweeps.task import Batch, Task, WorkerSession
+
+SINGLE_CASES = 5
+"""Cases run one at a time to time a method's update in a batch of one."""
+
+
+_NO_RECORDS = pd.DataFrame({name: pd.Series(dtype=str) for name in ("scenario", "case", "method")})
+
+
+def time_single_cases(tasks: Sequence[Task], results: ResultFolder) -> tuple[dict[str, float], pa.Table]:
+    """Run a few cases of each scenario and method one at a time, the most illustrative one first and recorded.
+
+    Scenes are left out: their cases cannot be run alone.
+
+    Returns:
+        Time of one update in a batch of one [us] by method, and the records of the illustrative cases.
+    """
+    illustrative: dict[str, str] = {}
+    efforts: dict[str, Effort] = {}
+    records = [_NO_RECORDS]
+    worker_session = WorkerSession(tiles=1)
+    for batch in tasks:
+        if batch.variation or not isinstance(batch, Batch):
+            continue
+        scenario = batch.scenario.name
+        if scenario not in illustrative:
+            illustrative[scenario] = _illustrative_case(
+                results.rows_of(scenario, "", ["case", "failed", "distance_m"]).to_pandas()
+            )
+        order = np.argsort(batch.encounters.case != illustrative[scenario], kind="stable")[:SINGLE_CASES]
+        few = batch.take(order)
+        ramp = Ramp.load(batch.scenario.ramp)
+        run = few.simulate(few.world(worker_session, ramp), ramp, traced=(0,))
+        efforts.setdefault(batch.method.name, Effort()).add(run.effort)
+        names = {"scenario": scenario, "case": str(few.encounters.case[0]), "method": batch.method.name}
+        records.append(pd.DataFrame(run.traces[0]).assign(**names))
+    worker_session.close()
+    times = {name: 1e6 * e.method_s / e.encounter_cycles for name, e in efforts.items() if e.encounter_cycles}
+    return times, pa.Table.from_pandas(pd.concat(records), preserve_index=False)
+
+
+def _illustrative_case(rows: pd.DataFrame) -> str:
+    """The case on which the methods differ most: in failing, then in where they are when the host arrives."""
+    by_case = rows.groupby("case")
+    failing = by_case["failed"].mean()
+    spread = by_case["distance_m"].max() - by_case["distance_m"].min()
+    order = pd.DataFrame({"split": failing * (1 - failing), "spread": spread.fillna(0.0)})
+    return str(order.sort_values(["split", "spread"], ascending=False, kind="stable").index[0])

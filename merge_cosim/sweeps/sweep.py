@@ -1,0 +1,143 @@
+"""A sweep: plan, run the chunks, store them as they come, and sum up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import pandas as pd
+
+from merge_cosim.results.statistics import belief, calibration, oracle_best, strata, summarise
+from merge_cosim.results.statistics.comparison import reference_of
+from merge_cosim.results.statistics.traffic import scene_tables
+from merge_cosim.results.store import (
+    BELIEF_CSV,
+    CALIBRATION_CSV,
+    MANIFEST,
+    STRATA_CSV,
+    SUMMARY_CSV,
+    SUMMARY_JSON,
+    ResultFolder,
+)
+from merge_cosim.scenarios.methods import ORACLE_BEST
+from merge_cosim.simulation.loop import Effort
+from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
+from merge_cosim.sweeps.executors import executor_for
+from merge_cosim.sweeps.identity import identity
+from merge_cosim.sweeps.plan import SweepRequest, method_names, plan
+from merge_cosim.sweeps.single_timing import time_single_cases
+from merge_cosim.sweeps.task import Task
+
+__all__ = ["SweepRequest", "plan", "sweep"]
+
+Progress = Callable[[int, int, str], None]
+"""Told the cases done, the cases in all and what is being run."""
+
+
+@dataclass
+class _Tally:
+    """What the chunks of this run cost; those of an interrupted run before it are not in it."""
+
+    effort: Effort = field(default_factory=Effort)
+    by_method: dict[str, Effort] = field(default_factory=dict)
+
+    def add(self, method: str, effort: Effort) -> None:
+        self.effort.add(effort)
+        self.by_method.setdefault(method, Effort()).add(effort)
+
+
+def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Progress | None = None) -> dict[str, Any]:
+    """Run a sweep and write its result folder; returns the manifest.
+
+    Args:
+        request: What to run.
+        out: Result folder.
+        resume: Finish an interrupted sweep; a finished one is left as it is.
+        progress: Told how far it is.
+
+    Raises:
+        UserError: See `plan` and `ResultFolder.begin`.
+    """
+    begin = perf_counter()
+    tasks = plan(request)
+    folder = ResultFolder(out)
+    what = identity(request, tasks)
+    if resume and folder.holds(what):
+        manifest: dict[str, Any] = folder.read_json(MANIFEST)
+        return manifest
+    folder.begin(what, resume)
+    planned = perf_counter()
+    tally = _run(request, list(cut(tasks)), folder, progress)
+    ran = perf_counter()
+    wants_best = not request.methods or ORACLE_BEST in request.methods
+    folder.merge(oracle_best if wants_best else None)
+    scenes = folder.scenes()
+    _sum_up(tasks, folder, scenes, tally, reference_of(method_names(request, tasks), request.against))
+    effort, run_s = tally.effort, ran - planned
+    manifest = {
+        **what,
+        "left_out": {task.scenario.name: list(task.left_out) for task in tasks if task.left_out},
+        "command": {"jobs": request.jobs, "start": request.start, "dask": request.dask, "resumed": resume},
+        "wall_s": round(perf_counter() - begin, 3),
+        "plan_s": round(planned - begin, 3),
+        "run_s": round(run_s, 3),
+        "store_s": round(perf_counter() - ran, 3),
+        "loop_s": round(effort.wall_s, 3),
+        "step_s": round(effort.step_s, 3),
+        "vehicle_steps": effort.vehicle_steps,
+        "vehicle_steps_per_s": round(effort.vehicle_steps / run_s) if effort.vehicle_steps else None,
+        "ratio_to_bare_sumo": round(effort.wall_s / effort.step_s, 3) if effort.step_s else None,
+        "real_time_factor": round(effort.scene_s / effort.wall_s, 2) if effort.scene_s else None,
+        "worst_station_difference_m": effort.worst_difference_m,
+    }
+    folder.write_json(MANIFEST, manifest)
+    folder.finish()
+    return manifest
+
+
+def _run(request: SweepRequest, chunks: Sequence[Chunk], folder: ResultFolder, progress: Progress | None) -> _Tally:
+    """Run and store what is not yet stored."""
+    done = folder.done()
+    queue = ChunkQueue(chunk for chunk in chunks if chunk.name not in done)
+    total = sum(map(len, chunks))
+    finished = sum(len(chunk) for chunk in chunks if chunk.name in done)
+    tally = _Tally()
+    for chunk, rows, effort in executor_for(request, len(queue)).run(queue):
+        folder.add(chunk.name, rows)
+        queue.finished(chunk, effort)
+        tally.add(chunk.whole.method.name, effort)
+        finished += len(chunk)
+        if progress:
+            progress(finished, total, f"{chunk.whole.scenario.name} {chunk.whole.method.name}")
+    return tally
+
+
+def _sum_up(
+    tasks: Sequence[Task], folder: ResultFolder, scenes: list[dict[str, Any]], tally: _Tally, against: str | None
+) -> None:
+    """Write the traces, the summary and the tables beside it, one scenario and variation at a time."""
+    single_us, traces = time_single_cases(tasks, folder)
+    folder.write_traces(traces)
+    cycle_us = {
+        name: (1e6 * effort.method_s / effort.encounter_cycles, single_us.get(name))
+        for name, effort in tally.by_method.items()
+        if effort.encounter_cycles
+    }
+    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in (SUMMARY_CSV, STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV)}
+    for group in folder.groups():
+        rows = folder.rows_of(*group).to_pandas()
+        parts[SUMMARY_CSV].append(summarise(rows, cycle_us, against))
+        parts[STRATA_CSV].append(strata(rows, against))
+        parts[BELIEF_CSV].append(belief(rows))
+        parts[CALIBRATION_CSV].append(calibration(rows))
+    tables = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in parts.items()}
+    tables |= scene_tables(scenes)
+    for name, table in tables.items():
+        (folder.path / name).unlink(missing_ok=True)
+        if len(table):
+            table.to_csv(folder.path / name, index=False)
+    summary = tables[SUMMARY_CSV]
+    folder.write_json(SUMMARY_JSON, summary.astype(object).where(summary.notna(), None).to_dict("records"))

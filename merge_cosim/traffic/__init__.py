@@ -1,1 +1,0 @@
-"""How the merging car drives; SUMO's own traffic."""

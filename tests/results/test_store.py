@@ -1,0 +1,53 @@
+"""The parts of a sweep, joined a stretch at a time: what a stretch is must not show."""
+
+from itertools import pairwise
+
+import pyarrow as pa
+import pytest
+from test_summaries import frame
+
+from merge_cosim.results import store
+from merge_cosim.results.rows import KEY, SCHEMA
+from merge_cosim.results.store import ResultFolder
+
+PIECES = {"acc": (4, 9, 13), "pgm": (7, 8)}
+"""Where the cases of a method are cut; the first and the last one are ends."""
+
+
+def pieces():
+    """Parts by name: 15 cases under two methods, of two scenarios, cut at different places."""
+    for scenario in ("s", "t"):
+        for method, cuts in PIECES.items():
+            ends = (0, *cuts, 15)
+            for number, (first, last) in enumerate(pairwise(ends)):
+                rows = [{"scenario": scenario, "case": f"c{i:02d}", "method": method} for i in range(first, last)]
+                table = pa.Table.from_pandas(frame(*rows), schema=SCHEMA, preserve_index=False)
+                yield f"{scenario}{method}-{number}", table
+
+
+@pytest.mark.parametrize("rows_at_a_time", [1, 5, 12, 100_000])
+def test_rows_are_in_order_and_cases_whole_whatever_a_stretch_is(tmp_path, monkeypatch, rows_at_a_time):
+    monkeypatch.setattr(store, "STRETCH_ROWS", rows_at_a_time)
+    folder = ResultFolder(tmp_path)
+    folder.begin({}, resume=False)
+    for name, rows in pieces():
+        folder.add(name, rows)
+    stretches = []
+
+    def more(rows):
+        """What the statistics make of a stretch: a row of a third method for every case that has both."""
+        stretches.append(rows)
+        found = rows.to_pandas()
+        both = found.groupby(["scenario", "case"])["method"].transform("nunique") == 2
+        made = found[both].drop_duplicates(["scenario", "case"]).assign(method="both")
+        return pa.Table.from_pandas(made, schema=SCHEMA, preserve_index=False)
+
+    folder.merge(more)
+    groups, of_t = folder.groups(), folder.rows_of("t", "")
+    folder.finish()
+    rows = folder.results()
+    assert rows.num_rows == 2 * 3 * 15
+    assert rows.equals(rows.sort_by(KEY))
+    assert (len(stretches) > 2) == (rows_at_a_time < 15)
+    assert groups == [("s", ""), ("t", "")]
+    assert of_t.num_rows == 45

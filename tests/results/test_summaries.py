@@ -1,0 +1,134 @@
+"""Summary rows against counts by hand."""
+
+import re
+from pathlib import Path
+
+import pandas as pd
+import pyarrow as pa
+import pytest
+
+from merge_cosim.results.rows import SCHEMA
+from merge_cosim.results.statistics import oracle_best, summarise
+
+BASE = dict.fromkeys(SCHEMA.names) | {
+    "scenario": "s",
+    "variation": "",
+    "site": "us101",
+    "source": "ngsim",
+    "car": "us101/a/1/1",
+    "model": "",
+    "failed": False,
+    "failure_kind": "",
+    "censored": False,
+    "extended": False,
+    "smoothed_source": False,
+    "host_reached": True,
+    "host_first": True,
+    "order_swapped": None,
+    "label": "",
+    "correct_at_merge": None,
+    "decision_flips": 0,
+    "distance_m": 10.0,
+    "gap_m": 5.0,
+    "min_gap_m": 5.0,
+    "min_ttc_s": None,
+    "delay_s": 1.0,
+    "hardest_braking": 2.0,
+    "host_reached_s": 3.0,
+    "merging_reached_s": 4.0,
+    "end_s": 6.0,
+    "ambiguity_s": 0.5,
+    "sumo_collision": False,
+}
+
+
+def frame(*rows):
+    """Result rows as pandas reads them from a sweep's file."""
+    table = pa.Table.from_pandas(pd.DataFrame([BASE | row for row in rows]), schema=SCHEMA, preserve_index=False)
+    return table.to_pandas()
+
+
+def test_rates_and_bounds():
+    rows = [{"case": str(i), "method": "m"} for i in range(10)]
+    rows[0] |= {"failed": True, "failure_kind": "side"}
+    rows[1] |= {"failed": True, "failure_kind": "merging_into_host"}
+    rows[2] |= {"censored": True}
+    rows[3] |= {"censored": True}
+    row = summarise(frame(*rows), {"m": (1.0, 20.0)}).iloc[0]
+    assert (row["n"], row["failures"], row["censored"]) == (8, 2, 2)
+    assert row["failure_pct"] == 25.0
+    assert row["failure_pct_best"] == 20.0
+    assert row["failure_pct_worst"] == 40.0
+    assert row["failure_pct_own"] == pytest.approx(100 / 7, abs=1e-3)
+    # Wilson 95 % for 2 of 8, by the formula
+    z, p, n = 1.959964, 0.25, 8
+    middle, half = p + z * z / (2 * n), z * (p * (1 - p) / n + z * z / (4 * n * n)) ** 0.5
+    assert row["ci_low_pct"] == pytest.approx(100 * (middle - half) / (1 + z * z / n), abs=1e-3)
+    assert row["ci_high_pct"] == pytest.approx(100 * (middle + half) / (1 + z * z / n), abs=1e-3)
+    assert (row["cycle_us"], row["cycle_us_single"]) == (1.0, 20.0)
+
+
+def test_oracle_best_takes_the_safe_one_then_the_quick_one():
+    rows = frame(
+        {"case": "a", "method": "always-go", "failed": True, "delay_s": 0.0},
+        {"case": "a", "method": "always-yield", "delay_s": 9.0},
+        {"case": "b", "method": "always-go", "delay_s": 0.5},
+        {"case": "b", "method": "always-yield", "delay_s": 9.0},
+        {"case": "c", "method": "always-go"},  # its rival was not run
+        {"case": "a", "method": "acc"},
+    )
+    best = oracle_best(pa.Table.from_pandas(rows, schema=SCHEMA, preserve_index=False)).to_pandas().set_index("case")
+    assert best["delay_s"].to_dict() == {"a": 9.0, "b": 0.5}
+    assert set(best["method"]) == {"oracle-best"}
+
+
+def test_unnecessary_yields_need_a_safe_first_passage_of_always_go():
+    go = {"method": "always-go", "gap_m": 2.0}
+    rows = frame(
+        {"case": "possible", **go},
+        {"case": "close", **go, "gap_m": 1.9},
+        {"case": "failing", **go, "failed": True},
+        {"case": "second", **go, "host_first": False},
+        *({"case": case, "method": "m", "host_first": False} for case in ("possible", "close", "failing", "second")),
+    )
+    summary = summarise(rows, {}).set_index("method")
+    assert summary.loc["m", "unnecessary_yields"] == 1
+    assert summary.loc["always-go", "unnecessary_yields"] == 0
+    alone = summarise(frame({"case": "x", "method": "m"}, {"case": "y", "method": "m", "host_first": False}), {}).iloc[
+        0
+    ]
+    assert pd.isna(alone["unnecessary_yields"])
+
+
+def test_living_traffic_has_no_case_in_common():
+    methods = ("always-go", "always-yield", "m")
+    rows = frame(
+        *(
+            {"case": "000/h.0/m.0", "method": name, "source": "traffic", "host_first": name == "always-go"}
+            for name in methods
+        )
+    )
+    assert not len(oracle_best(pa.Table.from_pandas(rows, schema=SCHEMA, preserve_index=False)))
+    summary = summarise(rows, {}, against="always-go").set_index("method")
+    assert summary[["unnecessary_yields", "only_this_fails", "mcnemar_p"]].isna().all().all()
+    logged = summarise(rows.assign(source="ngsim"), {}, against="always-go").set_index("method")
+    assert (logged.loc["m", "unnecessary_yields"], logged.loc["m", "only_this_fails"]) == (1, 0)
+
+
+def test_sites_are_pooled_only_within_one_source():
+    one = frame({"case": "a", "method": "m"}, {"case": "b", "method": "m", "site": "i80"})
+    assert summarise(one, {})["site"].tolist() == ["all", "i80", "us101"]
+    two = frame({"case": "a", "method": "m"}, {"case": "b", "method": "m", "site": "i80", "source": "surrogate"})
+    assert summarise(two, {})["site"].tolist() == ["i80", "us101"]
+
+
+def test_a_fixed_grid_has_no_interval():
+    row = summarise(frame({"case": "a", "method": "m", "source": "designed"}), {}).iloc[0]
+    assert pd.isna(row["ci_low_pct"])
+
+
+def test_every_column_is_defined_on_the_page_of_measures():
+    page = (Path(__file__).parents[2] / "docs" / "measures.md").read_text(encoding="utf-8")
+    summary = summarise(frame({"case": "a", "method": "m"}), {})
+    columns = {re.sub(r"^(log_odds|arrival_lead)_\d+$", r"\1_G", name) for name in (*SCHEMA.names, *summary)}
+    assert columns - set(re.findall(r"`(\w+)`", page)) == set()

@@ -1,0 +1,60 @@
+import pytest
+
+from merge_cosim.controllers.acc import Acc
+from merge_cosim.core.errors import UserError
+from merge_cosim.scenarios.methods import Method, parse_variation
+from merge_cosim.scenarios.scenario import load_scenario
+from merge_cosim.scenarios.sources import Span
+from merge_cosim.sweeps.task import free_law
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "step", "values"),
+    [
+        (1, 25, 5, [1, 6, 11, 16, 21]),  # 26 would be beyond the end
+        (0, 1, 0.1, [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1]),
+        (3, 3, 1, [3]),
+        (-5, 5, 5, [-5, 0, 5]),
+    ],
+)
+def test_no_value_lies_beyond_the_end(first, last, step, values):
+    span = Span.model_validate({"from": first, "to": last, "step": step})
+    assert span.values() == pytest.approx(values)
+    assert parse_variation(f"acc.d0={first}:{last}:{step}")[1] == pytest.approx(values)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "expected"),
+    [
+        ("encounters.demand.warm_up", 600, r"demand: warm_up \(600 s\) must be less than duration \(600 s\)"),
+        ("encounters.attention.apart", -5, "apart = -5: Input should be greater than 0"),
+        ("test.time_out", float("inf"), "time_out = inf: Input should be a finite number"),
+    ],
+)
+def test_values_that_make_no_sense_are_refused(setting, value, expected):
+    with pytest.raises(UserError, match=expected):
+        load_scenario("traffic-light", {setting: value})
+
+
+@pytest.mark.parametrize("text", ["acc.d0", "acc.d0=", "acc.d0=1:2", "acc.d0=2:1:1", "acc.d0=1:2:0", "acc.d0=1:inf:1"])
+def test_what_cannot_be_varied_is_refused(text):
+    with pytest.raises(UserError, match=r"--vary acc\.d0"):
+        parse_variation(text)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"), [("headway", float("inf")), ("k_gap", float("nan")), ("max_acceleration", 0)]
+)
+def test_numbers_with_which_a_host_would_never_arrive_are_refused(parameter, value):
+    with pytest.raises(UserError, match=f"acc: controller acc: {parameter} = "):
+        Method.parse("acc", {f"acc.{parameter}": value})
+
+
+def test_delays_are_measured_against_what_is_set_of_acc_whatever_drives():
+    law = free_law(Method.parse("pgm+lqr", {"acc.k_free": 0.2, "pgm.nodes": 3, "lqr.k_free": 0.3}))
+    assert law == Acc(k_free=0.2)
+
+
+def test_a_horizon_without_end_is_refused():
+    with pytest.raises(UserError, match=r"test\.horizon = inf: Input should be a finite number"):
+        load_scenario("designed-2", {"test.horizon": float("inf")})

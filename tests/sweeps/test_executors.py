@@ -1,0 +1,155 @@
+"""Executors: every one gives the same rows, and a killed worker costs no more than its chunk."""
+
+import os
+import signal
+import threading
+import time
+
+import psutil
+import pyarrow as pa
+import pytest
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.estimators.base import estimators
+from merge_cosim.results.rows import KEY
+from merge_cosim.simulation.loop import Effort
+from merge_cosim.sweeps.chunks import ChunkQueue, cut
+from merge_cosim.sweeps.executors import InProcess, Processes
+from merge_cosim.sweeps.plan import SweepRequest, plan
+
+CASES = {"encounters.count": 120}
+
+
+def chunks(methods=("acc", "slot"), most=40):
+    return list(cut(plan(SweepRequest(["designed-random"], methods, settings=CASES)), most))
+
+
+def rows(executor, queue=None):
+    finished = list(executor.run(queue or ChunkQueue(chunks())))
+    assert len({one.chunk.name for one in finished}) == len(finished) == 6
+    for one in finished:
+        assert len(one.rows) == len(one.chunk)
+    return pa.concat_tables([one.rows for one in finished]).sort_by(KEY)
+
+
+@pytest.fixture(scope="module")
+def expected():
+    return rows(InProcess())
+
+
+def kill_workers(count, stop, killed):
+    """Kill the first `count` different worker processes of this process that are seen."""
+    me = os.getpid()
+    while len(killed) < count and not stop.is_set():
+        for process in psutil.Process(me).children():
+            if process.pid not in killed and "resource_tracker" not in " ".join(process.cmdline()):
+                killed.add(process.pid)
+                os.kill(process.pid, signal.SIGKILL)
+                break
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("start", ["spawn", "fork"])
+def test_processes_give_the_rows_of_one(expected, start):
+    assert rows(Processes(2, start=start)).equals(expected)
+
+
+def test_a_killed_worker_costs_its_piece_only(expected):
+    stop, killed = threading.Event(), set()
+    killer = threading.Thread(target=kill_workers, args=(2, stop, killed))
+    killer.start()
+    try:
+        found = rows(Processes(2))
+    finally:
+        stop.set()
+        killer.join()
+    assert len(killed) == 2
+    assert found.equals(expected)
+
+
+@pytest.fixture
+def own_registry(monkeypatch):
+    """What a test registers is gone after it: no other test of this process is to run a deadly estimator."""
+    monkeypatch.setattr(estimators, "_classes", {name: estimators[name] for name in estimators.names()})
+
+
+def test_a_piece_that_kills_every_worker_ends_the_sweep_with_a_clear_line(tmp_path, own_registry):
+    plugin = tmp_path / "deadly.py"
+    plugin.write_text(
+        """
+import os, signal
+from dataclasses import dataclass
+from typing import ClassVar
+from merge_cosim.estimators.base import Estimator, estimators
+
+@estimators.register
+@dataclass(kw_only=True)
+class Deadly(Estimator):
+    name: ClassVar[str] = "deadly"
+    def update(self, seen):
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+    )
+    request = SweepRequest(["designed-random"], ["acc", "deadly"], settings=CASES, plugins=[plugin])
+    queue = ChunkQueue(cut(plan(request), 60))
+    with pytest.raises(
+        UserError, match=r"designed-random, deadly, cases r00000\d0 to .* 3 worker processes .* signal 9"
+    ):
+        list(Processes(2, [plugin]).run(queue))
+
+
+def test_an_error_in_a_worker_is_raised_here(tmp_path, own_registry):
+    plugin = tmp_path / "faulty.py"
+    plugin.write_text(
+        """
+from dataclasses import dataclass
+from typing import ClassVar
+from merge_cosim.estimators.base import Estimator, estimators
+
+@estimators.register
+@dataclass(kw_only=True)
+class Faulty(Estimator):
+    name: ClassVar[str] = "faulty"
+    def update(self, seen):
+        return 1 / 0
+"""
+    )
+    request = SweepRequest(["designed-random"], ["faulty"], settings=CASES, plugins=[plugin])
+    with pytest.raises(ZeroDivisionError) as raised:
+        list(Processes(2, [plugin]).run(ChunkQueue(cut(plan(request), 60))))
+    assert f'File "{plugin}", line 11, in update' in raised.value.__notes__[0]
+
+
+def test_no_fork_beside_threads():
+    stop = threading.Event()
+    thread = threading.Thread(target=stop.wait)
+    thread.start()
+    try:
+        with pytest.raises(UserError, match="--start spawn"):
+            Processes(2, start="fork")
+    finally:
+        stop.set()
+        thread.join()
+
+
+def test_pieces_cover_all_cases_once():
+    found = chunks(most=50)
+    for batch in {id(chunk.whole): chunk.whole for chunk in found}.values():
+        own = [chunk for chunk in found if chunk.whole is batch]
+        assert [chunk.first for chunk in own] == [0, 40, 80]
+        assert own[-1].last == len(batch.encounters)
+        assert own[1].task().encounters.case.tolist() == batch.encounters.case[40:80].tolist()
+
+
+def test_the_longest_piece_goes_first_once_methods_are_known():
+    queue = ChunkQueue(chunks(most=30))
+    first, second = queue.take(), queue.take()
+    assert {first.whole.method.name, second.whole.method.name} == {"acc", "slot"}  # one of each to begin with
+    slow, quick = (first, second) if first.whole.method.name == "slot" else (second, first)
+    queue.finished(slow, Effort(wall_s=50.0))
+    queue.finished(quick, Effort(wall_s=1.0))
+    order = [queue.take() for _ in range(len(queue))]
+    assert [chunk.whole.method.name for chunk in order] == ["slot"] * 3 + ["acc"] * 3
+    lengths = [chunk.cycles for chunk in order[:3]]
+    assert lengths == sorted(lengths, reverse=True)
+    assert queue.take() is None
