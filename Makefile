@@ -4,7 +4,7 @@ VENV := .venv
 DEMO := acc slot pgm always-go always-yield always-brake oracle-best
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint docs clean
 
 demo: $(VENV)/installed
 	$(BIN)/merge-cosim sweep designed-2 $(DEMO:%=--method %) --out out/demo
@@ -19,6 +19,10 @@ lint: $(VENV)/installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: out/venv-docs/installed
+	out/venv-docs/bin/mkdocs build --strict --quiet
+	@echo "open out/site/index.html"
+
 clean:
 	rm -rf $(VENV) out
 
@@ -27,4 +31,11 @@ $(VENV)/installed: pyproject.toml
 		{ echo "make: Python 3.11 or newer is needed; name one with PYTHON=python3.12"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@
+
+# The API reference is read from the source text, so the docs need neither SUMO nor the package itself.
+out/venv-docs/installed: pyproject.toml
+	$(PYTHON) -m venv out/venv-docs
+	out/venv-docs/bin/python -m pip install --quiet --disable-pip-version-check \
+		$$($(PYTHON) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"])')
 	@touch $@

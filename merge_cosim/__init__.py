@@ -1,3 +1,3 @@
 """merge-cosim: SUMO co-simulation of freeway on-ramp merging between an autonomous host and a human driver."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -23,8 +23,8 @@ class Lqr(Following):
     `a = 0.213 e + 0.569 w`, so nearly acc (0.23 and 0.6): a comparison of the two compares little.
 
     Attributes:
-        q_gap: Weight of the squared gap error, Q[0, 0] [1/m^2].
-        q_speed: Weight of the squared speed difference, Q[1, 1] [s^2/m^2].
+        q_gap: Weight of the squared gap error, entry (0, 0) of Q [1/m^2].
+        q_speed: Weight of the squared speed difference, entry (1, 1) of Q [s^2/m^2].
         r: Weight R of the squared acceleration [s^4/m^2].
     """
 
