@@ -123,7 +123,8 @@ def compare(a: Path, b: Path, part: bool = False) -> bool:
         common = len(one[list(KEYS[file])].merge(other[list(KEYS[file])]))
         if part and file == RESULTS and not common:
             raise BadInputError(f"{a} and {b} have no rows in common")
-        print(f"{file}: {len(one)} and {len(other)} rows, {common} in both; {'DIFFERENT' if found else 'the same'}")
+        verdict = "DIFFERENT" if found else "the same" if common or not part else "nothing to compare"
+        print(f"{file}: {len(one)} and {len(other)} rows, {common} in both; {verdict}")
         for name, mine, others in (("A", one, other), ("B", other, one)):
             alone = [column for column in mine.columns if column not in others]
             if alone:

@@ -126,8 +126,8 @@ def _chapter(
     pictures = [] if section.site == ALL_SITES else _case_pictures(section, rows, traces, drawn)
     if is_grid:
         caption = (
-            "Failure map: share of the host's initial offsets at which the case failed, by both initial speeds as in "
-            "the cases' names. A dot marks speeds at which a host did not arrive in time for at least one offset."
+            "Failure map: share of the cases that failed, by both initial speeds (one case for each initial offset of "
+            "the host). A dot marks speeds at which a host did not arrive in time in at least one of them."
         )
         pictures.append(Picture.of(set_figures.failure_map(rows), caption, wide=True))
     else:

@@ -14,38 +14,41 @@ from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look, in_order
 from merge_cosim.results.statistics.summary import ALL_SITES, AMBIGUITY_EDGES
 
-GRID_CASE = r"^d(?P<offset>[+-][\d.]+)_h(?P<host>[\d.]+)_m(?P<merging>[\d.]+)$"
-"""Name of a grid's case: the host's offset [m] and both initial speeds [m/s]."""
 CELL = (1.8, 1.9)
 SHOWN = 0.95
 """Share of the cases inside the axes, of those in which the host arrived; the rest is drawn at the edges."""
 LEAST_RANGE = 1.0
 """Smallest range of the delays [s]."""
+MOST_SPEEDS, CLASS = 40, 1.0
+"""With more different speeds than this a failure map has classes of so many m/s."""
 MOST_NUMBERS = 24
 """Most bars that carry their number."""
 
 
 def failure_map(results: pd.DataFrame) -> Figure:
-    """Share of failed cases over the host's offsets, by both initial speeds, one small map per method.
+    """Share of failed cases by both initial speeds, one small map per method; speeds without a case stay blank.
 
-    A dot marks speeds at which a host did not reach the merging point in time for at least one offset.
+    A dot marks speeds at which a host did not reach the merging point in time in at least one case.
 
     Args:
-        results: Rows of one grid scenario, named as in `GRID_CASE`.
+        results: Rows of one scenario.
     """
-    speeds = results["case"].str.extract(GRID_CASE)[["host", "merging"]].astype(float)
-    rows = results.assign(host=speeds["host"], merging=speeds["merging"], absent=~results["host_reached"])
+    rows = results.assign(
+        host=_classes(results["host_speed_0"]),
+        merging=_classes(results["merging_speed_0"]),
+        absent=~results["host_reached"],
+    )
     methods = in_order(rows["method"])
     shares = {method: _by_speeds(rows[rows["method"] == method], "failed") for method in methods}
-    top = max(max(float(share.to_numpy().max()) for share in shares.values()), 1e-3)
+    top = max(max(float(np.nanmax(share.to_numpy())) for share in shares.values()), 1e-3)
     with canvas.style():
         figure, axes = canvas.grid_of(len(methods), 4, CELL)
         for ax, (method, share) in zip(axes, shares.items(), strict=True):
             x, y = share.columns.to_numpy(dtype=float), share.index.to_numpy(dtype=float)
-            image = ax.imshow(
-                100 * share.to_numpy(), origin="lower", extent=_extent(x, y), vmin=0, vmax=100 * top, cmap="YlOrRd"
+            image = ax.pcolormesh(
+                _edges(x), _edges(y), 100 * share.to_numpy(), vmin=0, vmax=100 * top, cmap="YlOrRd", rasterized=True
             )
-            absent = _by_speeds(rows[rows["method"] == method], "absent").to_numpy()
+            absent = _by_speeds(rows[rows["method"] == method], "absent").fillna(0.0).to_numpy()
             row, column = np.nonzero(absent)
             ax.scatter(x[column], y[row], s=1.2, color="#333333", linewidths=0)
             ax.set_title(method)
@@ -53,7 +56,7 @@ def failure_map(results: pd.DataFrame) -> Figure:
             ax.set_aspect("auto")
         figure.supxlabel("merging car's initial speed [m/s]", fontsize=9)
         figure.supylabel("host's initial speed [m/s]", fontsize=9)
-        figure.colorbar(image, ax=axes, label="failed offsets [%]", shrink=0.7, aspect=25)
+        figure.colorbar(image, ax=axes, label="failed cases [%]", shrink=0.7, aspect=25)
     return figure
 
 
@@ -140,11 +143,20 @@ def _bars(ax: Any, i: int, n: int, rate: FloatArray, low: FloatArray, high: Floa
             ax.annotate(f"{height:.1f}", (place, height), (0, 1), textcoords="offset points", ha="center", fontsize=7)
 
 
+def _classes(speeds: pd.Series) -> pd.Series:
+    """The speeds themselves where they are few, as in a grid; else the middles of classes of `CLASS` m/s."""
+    if speeds.nunique() <= MOST_SPEEDS:
+        return speeds
+    return (np.floor(speeds / CLASS) + 0.5) * CLASS
+
+
 def _by_speeds(rows: pd.DataFrame, column: str) -> pd.DataFrame:
-    return rows.pivot_table(index="host", columns="merging", values=column, aggfunc="mean").fillna(0.0)
+    return rows.pivot_table(index="host", columns="merging", values=column, aggfunc="mean")
 
 
-def _extent(x: FloatArray, y: FloatArray) -> tuple[float, float, float, float]:
-    half_x = (x[1] - x[0]) / 2 if len(x) > 1 else 0.5
-    half_y = (y[1] - y[0]) / 2 if len(y) > 1 else 0.5
-    return float(x[0] - half_x), float(x[-1] + half_x), float(y[0] - half_y), float(y[-1] + half_y)
+def _edges(middles: FloatArray) -> FloatArray:
+    """Borders of cells around their middles, half-way between neighbours; of one alone half a m/s on each side."""
+    if len(middles) == 1:
+        return middles[0] + np.array([-0.5, 0.5])
+    between = (middles[1:] + middles[:-1]) / 2
+    return np.concatenate([[2 * middles[0] - between[0]], between, [2 * middles[-1] - between[-1]]])

@@ -1,4 +1,4 @@
-"""From the measures of a run to result rows: one per (scenario, case, method), with a fixed schema."""
+"""From the measures of a run to result rows: one per (scenario, case, method), in the columns of `schema`."""
 
 from __future__ import annotations
 
@@ -11,60 +11,11 @@ from merge_cosim.controllers.acc import Acc
 from merge_cosim.core.encounter import NEVER, Encounters, Intention
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, time_to_arrival
+from merge_cosim.results.schema import SCHEMA, SUMO
 from merge_cosim.scoring.decisions import GATES
 from merge_cosim.scoring.scoring import GOAL, KINDS
 from merge_cosim.simulation.loop import Run
 from merge_cosim.simulation.worlds.logged import AROUND
-
-SCHEMA_VERSION = "3"
-SCHEMA = pa.schema(
-    [
-        ("scenario", pa.string()),
-        ("variation", pa.string()),
-        ("site", pa.string()),
-        ("source", pa.string()),
-        ("case", pa.string()),
-        ("car", pa.string()),
-        ("method", pa.string()),
-        ("model", pa.string()),
-        ("failed", pa.bool_()),
-        ("failure_kind", pa.string()),
-        ("censored", pa.bool_()),
-        ("extended", pa.bool_()),
-        ("smoothed_source", pa.bool_()),
-        ("host_reached", pa.bool_()),
-        ("host_first", pa.bool_()),
-        ("order_swapped", pa.bool_()),
-        ("label", pa.string()),
-        ("correct_at_merge", pa.bool_()),
-        ("decision_flips", pa.int32()),
-        ("distance_m", pa.float64()),
-        ("gap_m", pa.float64()),
-        ("min_gap_m", pa.float64()),
-        ("min_ttc_s", pa.float64()),
-        ("max_drac", pa.float64()),
-        ("pet_s", pa.float64()),
-        ("min_leader_gap_m", pa.float64()),
-        ("min_leader_ttc_s", pa.float64()),
-        ("min_follower_gap_m", pa.float64()),
-        ("merging_stopped", pa.bool_()),
-        ("delay_s", pa.float64()),
-        ("hardest_braking", pa.float64()),
-        ("mean_jerk", pa.float64()),
-        ("first_stable_s", pa.float64()),
-        *((f"log_odds_{gate}", pa.float64()) for gate in GATES),
-        *((f"arrival_lead_{gate}", pa.float64()) for gate in GATES),
-        ("human_station_rms_m", pa.float64()),
-        ("human_speed_rms", pa.float64()),
-        ("host_reached_s", pa.float64()),
-        ("merging_reached_s", pa.float64()),
-        ("end_s", pa.float64()),
-        ("ambiguity_s", pa.float64()),
-        ("sumo_collision", pa.bool_()),
-    ],
-    metadata={"merge_cosim_schema": SCHEMA_VERSION},
-)
-KEY = [("scenario", "ascending"), ("variation", "ascending"), ("case", "ascending"), ("method", "ascending")]
 
 
 def result_rows(
@@ -74,6 +25,7 @@ def result_rows(
     free_law: Acc,
     names: dict[str, str],
     more: Mapping[str, AnyArray | pa.Array] = {},
+    world: str = SUMO,
 ) -> pa.Table:
     """Return the result rows of a run.
 
@@ -84,6 +36,7 @@ def result_rows(
         free_law: The controller whose free driving the delay is measured against.
         names: `scenario`, `variation`, `method` and `model` of all rows.
         more: Further columns, or others in their place, shape (n,) each; the columns of scenes are missing without.
+        world: What moved the cars, `SUMO` or `CLOSED_FORM`.
     """
     c, n, dt = run.columns, len(encounters), setting.dt
     failed = c["kind"] > 0
@@ -99,17 +52,25 @@ def result_rows(
         last_logged = encounters.log.merging_station.lengths - 1
         score_until = encounters.log.score_until
     unfinished = ~failed & ~c["scored_to_end"]
+    cut_off = unfinished & ((c["end_cycle"] >= score_until) | (c["scored_from"] >= 0))
+    censored = more.get("censored", cut_off)
+    reached = ~np.isnan(c["host_reached_s"]) | (encounters.host_station >= 0)
     columns: dict[str, AnyArray | pa.Array] = {
         "site": encounters.site,
         "source": encounters.source,
         "case": encounters.case,
         "car": encounters.car,
+        "host_station_0_m": encounters.host_station,
+        "host_speed_0": encounters.host_speed,
+        "merging_station_0_m": encounters.merging_station,
+        "merging_speed_0": encounters.merging_speed,
         "failed": failed,
         "failure_kind": np.array(KINDS)[c["kind"].astype(np.int64)],
-        "censored": unfinished & ((c["end_cycle"] >= score_until) | (c["scored_from"] >= 0)),
+        "stuck": unfinished & ~reached & ~censored,
+        "censored": censored,
         "extended": c["end_cycle"] > last_logged,
         "smoothed_source": encounters.smoothed_source,
-        "host_reached": ~np.isnan(c["host_reached_s"]) | (encounters.host_station >= 0),
+        "host_reached": reached,
         "host_first": _masked(host_first, order_known),
         "order_swapped": _masked(host_first != (encounters.label == Intention.YIELD), order_known & labelled),
         "label": np.array(["YIELD", "NOT_YIELD", ""])[encounters.label],
@@ -139,10 +100,11 @@ def result_rows(
         **{name: _finite(c[name]) for name in AROUND if name in c},
         **more,
     }
+    constant = {**names, "world": world}
     arrays = []
     for column in SCHEMA:
-        if column.name in names:
-            arrays.append(pa.array([names[column.name]] * n, column.type))
+        if column.name in constant:
+            arrays.append(pa.array([constant[column.name]] * n, column.type))
         elif column.name not in columns:
             arrays.append(pa.nulls(n, column.type))
         elif isinstance(columns[column.name], pa.Array):

@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.results.rows import KEY, SCHEMA, SCHEMA_VERSION
+from merge_cosim.results.schema import KEY, SCHEMA, SCHEMA_VERSION, VERSION_KEY
 
 SCENE_FACTS = b"merge_cosim_scenes"
 """Metadata of a part: the facts of the scenes that its rows come from (JSON)."""
@@ -203,7 +203,7 @@ class ResultFolder:
         if not file.is_file():
             raise UserError(f"{file}: no results here; run a sweep first")
         rows = _read_table(file)
-        version = (rows.schema.metadata or {}).get(b"merge_cosim_schema", b"none").decode()
+        version = (rows.schema.metadata or {}).get(VERSION_KEY, b"none").decode()
         if version != SCHEMA_VERSION:
             raise UserError(f"{file}: result schema {version}, expected {SCHEMA_VERSION}; run the sweep again")
         return rows

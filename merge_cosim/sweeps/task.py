@@ -17,6 +17,7 @@ from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.rows import result_rows
+from merge_cosim.results.schema import CLOSED_FORM, SUMO
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.scoring.scoring import expected_cycles
@@ -162,7 +163,8 @@ class Batch(Task):
 
     def rows(self, run: Run, ramp: Ramp) -> pa.Table:
         """The result rows of a run."""
-        return result_rows(run, self.encounters, self.setting(ramp), free_law(self.method), self.names)
+        world = CLOSED_FORM if self.method.is_human else SUMO
+        return result_rows(run, self.encounters, self.setting(ramp), free_law(self.method), self.names, world=world)
 
 
 class WorkerSession:

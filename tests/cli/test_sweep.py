@@ -325,6 +325,7 @@ def test_replay_on_real_data(tmp_path, data_dir):
     assert not human["failed"].any()
     assert human["human_station_rms_m"].max() < 1e-6
     assert human["correct_at_merge"].isna().all()
+    assert (rows["world"] == "closed-form").equals(rows["method"] == "human")
     oracle = rows[rows["method"] == "oracle-label"]
     assert oracle["correct_at_merge"].dropna().all()
 

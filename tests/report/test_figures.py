@@ -60,12 +60,25 @@ def test_log_odds_only_of_estimators_that_weigh():
 def test_failure_map_shows_the_share_of_failed_offsets(results):
     figure = failure_map(results)
     panel = next(ax for ax in figure.axes if ax.get_title() == "always-go")
-    shown = panel.images[0].get_array()
+    shown = panel.collections[0].get_array()
     go = results[(results["method"] == "always-go")]
     assert shown.shape == (3, 3)
     assert shown.mean() == pytest.approx(100 * go["failed"].mean())
-    same = go[go["case"].str.contains("_h15_m15")]
+    same = go[(go["host_speed_0"] == 15.0) & (go["merging_speed_0"] == 15.0)]
     assert shown[1, 1] == pytest.approx(100 * same["failed"].mean())
+
+
+def test_failure_map_of_a_users_cases_needs_no_names(results):
+    states = np.random.default_rng(0).uniform(5.0, 25.0, (2, 500))
+    host, merging = states
+    rows = pd.DataFrame({"method": "m", "host_speed_0": host, "merging_speed_0": merging, "host_reached": True})
+    figure = failure_map(rows.assign(failed=host > 20.0))
+    panel = figure.axes[0].collections[0]
+    shown = panel.get_array()
+    assert shown.shape == (20, 20)  # classes of 1 m/s
+    assert np.ma.filled(shown[:15], 0.0).max() == 0.0
+    assert shown[15:].min() == 100.0
+    assert int(np.ma.getmaskarray(shown).sum()) == 400 - len(np.unique(np.floor(states), axis=1).T)  # blank, not 0 %
 
 
 def test_other_figures_can_be_drawn(swept, results):

@@ -122,6 +122,24 @@ def test_what_cannot_be_scored_to_the_end_is_censored(changed, censored):
     assert row(**changed)["censored"] is censored
 
 
+@pytest.mark.parametrize(
+    ("changed", "stuck"),
+    [
+        ({"scored_to_end": False, "end_cycle": 40, "scored_from": -1}, True),
+        (
+            {"scored_to_end": False, "end_cycle": 40, "scored_from": -1, "host_reached_s": 2.0},
+            False,
+        ),  # the other is late
+        ({"scored_to_end": False, "end_cycle": 60, "scored_from": -1}, False),  # the log's scoring ended: censored
+        ({"scored_to_end": False, "end_cycle": 40}, False),  # within the horizon: censored
+        ({"scored_to_end": False, "end_cycle": 40, "kind": 4}, False),  # a failure stands
+        ({}, False),  # the merging car alone was scored to the end
+    ],
+)
+def test_a_host_that_has_not_arrived_in_time_is_stuck(changed, stuck):
+    assert row(**{"host_reached_s": np.nan, **changed})["stuck"] is stuck
+
+
 def test_a_run_past_the_logs_end_is_extended():
     assert row(end_cycle=49)["extended"] is False
     assert row(end_cycle=50)["extended"] is True

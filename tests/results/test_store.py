@@ -7,7 +7,7 @@ import pytest
 from test_summaries import frame
 
 from merge_cosim.results import store
-from merge_cosim.results.rows import KEY, SCHEMA
+from merge_cosim.results.schema import KEY, SCHEMA
 from merge_cosim.results.store import ResultFolder
 
 PIECES = {"acc": (4, 9, 13), "pgm": (7, 8)}

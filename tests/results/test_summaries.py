@@ -7,7 +7,7 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 
-from merge_cosim.results.rows import SCHEMA
+from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics import oracle_best, summarise
 
 BASE = dict.fromkeys(SCHEMA.names) | {
@@ -19,6 +19,7 @@ BASE = dict.fromkeys(SCHEMA.names) | {
     "model": "",
     "failed": False,
     "failure_kind": "",
+    "stuck": False,
     "censored": False,
     "extended": False,
     "smoothed_source": False,
@@ -54,17 +55,19 @@ def test_rates_and_bounds():
     rows[1] |= {"failed": True, "failure_kind": "merging_into_host"}
     rows[2] |= {"censored": True}
     rows[3] |= {"censored": True}
+    rows[4] |= {"stuck": True, "host_reached": False}
     row = summarise(frame(*rows), {"m": (1.0, 20.0)}).iloc[0]
     assert (row["n"], row["failures"], row["censored"]) == (8, 2, 2)
     assert row["failure_pct"] == 25.0
     assert row["failure_pct_best"] == 20.0
     assert row["failure_pct_worst"] == 40.0
     assert row["failure_pct_own"] == pytest.approx(100 / 7, abs=1e-3)
-    # Wilson 95 % for 2 of 8, by the formula
-    z, p, n = 1.959964, 0.25, 8
-    middle, half = p + z * z / (2 * n), z * (p * (1 - p) / n + z * z / (4 * n * n)) ** 0.5
-    assert row["ci_low_pct"] == pytest.approx(100 * (middle - half) / (1 + z * z / n), abs=1e-3)
-    assert row["ci_high_pct"] == pytest.approx(100 * (middle + half) / (1 + z * z / n), abs=1e-3)
+    assert (row["stuck"], row["failed_or_stuck_pct"], row["failed_or_stuck_pct_worst"]) == (1, 37.5, 50.0)
+    for name, failures in (("ci", 2), ("failed_or_stuck", 3)):  # of 8, Wilson's 95 % by the formula
+        z, p, n = 1.959964, failures / 8, 8
+        middle, half = p + z * z / (2 * n), z * (p * (1 - p) / n + z * z / (4 * n * n)) ** 0.5
+        assert row[f"{name}_low_pct"] == pytest.approx(100 * (middle - half) / (1 + z * z / n), abs=1e-3)
+        assert row[f"{name}_high_pct"] == pytest.approx(100 * (middle + half) / (1 + z * z / n), abs=1e-3)
     assert (row["cycle_us"], row["cycle_us_single"]) == (1.0, 20.0)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.base import estimators
-from merge_cosim.results.rows import KEY
+from merge_cosim.results.schema import KEY
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.chunks import ChunkQueue, cut
 from merge_cosim.sweeps.executors import InProcess, Processes

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from merge_cosim.results.rows import SCHEMA
+from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics.comparison import compare
 from merge_cosim.results.statistics.rates import bootstrap_means, count, mean, percent, quantile, wilson
 from merge_cosim.scenarios.methods import CONSTANT, ORACLE_BEST
@@ -117,7 +117,9 @@ def _summary(
     scored = group[~group["censored"]]
     failures, n = int(scored["failed"].sum()), len(scored)
     censored = len(group) - n
+    stuck = int(scored["stuck"].sum())
     low, high = wilson(failures, n) if is_sample(group) else (None, None)
+    stuck_low, stuck_high = wilson(failures + stuck, n) if is_sample(group) else (None, None)
     batch_us, single_us = cycle_us.get(key["method"], (None, None))
     own = scored[scored["failure_kind"] != "merging_into_host"]
     labelled = group[group["correct_at_merge"].notna()]
@@ -133,6 +135,11 @@ def _summary(
         "censored": censored,
         "failure_pct_best": percent(failures, len(group)),
         "failure_pct_worst": percent(failures + censored, len(group)),
+        "stuck": stuck,
+        "failed_or_stuck_pct": percent(failures + stuck, n),
+        "failed_or_stuck_low_pct": stuck_low,
+        "failed_or_stuck_high_pct": stuck_high,
+        "failed_or_stuck_pct_worst": percent(failures + stuck + censored, len(group)),
         "extended": int(group["extended"].sum()),
         "host_not_reached": int((~group["host_reached"]).sum()),
         "host_first_pct": mean(group["host_first"], 100),
