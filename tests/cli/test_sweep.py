@@ -5,12 +5,11 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import time
 
 import pyarrow.parquet as pq
 import pytest
-from command import merge_cosim, refused, small_scenario, summary
+from command import COMMAND, merge_cosim, refused, run_process, small_scenario, summary
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
@@ -54,7 +53,7 @@ SUMMARY_CONTRACT = [
 
 def test_a_sweep_writes_the_promised_files(tmp_path):
     scenario = small_scenario(tmp_path)
-    done = merge_cosim("sweep", scenario, "--out", "out", "--jobs", 2, "--json", cwd=tmp_path)
+    done = merge_cosim("sweep", scenario, "--out", "out", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     rows = pq.read_table(tmp_path / "out/results.parquet").to_pandas()
@@ -82,9 +81,9 @@ def test_a_sweep_writes_the_promised_files(tmp_path):
 
 def test_one_process_or_two_give_the_same_bytes(tmp_path):
     scenario = small_scenario(tmp_path)
-    for jobs in (1, 2):
+    for run, jobs in ((merge_cosim, 1), (run_process, 2)):
         arguments = ("sweep", scenario, "--method", "pgm", "--method", "slot", "--out", f"out{jobs}", "--jobs", jobs)
-        assert merge_cosim(*arguments, cwd=tmp_path).returncode == 0
+        assert run(*arguments, cwd=tmp_path).returncode == 0
     one, two = ((tmp_path / f"out{jobs}/results.parquet").read_bytes() for jobs in (1, 2))
     assert one == two
 
@@ -125,9 +124,8 @@ def test_variations_and_settings(tmp_path):
 
 def interrupt(tmp_path, sent, *arguments, once="*.parquet"):
     """Start a sweep and send it, and its workers, a signal once a part is there; returns its status and last words."""
-    command = [sys.executable, "-m", "merge_cosim.cli.main", "sweep", *arguments]
-    process = subprocess.Popen(
-        [*command, "--out", "out", "--jobs", "2"],
+    running = subprocess.Popen(
+        [*COMMAND, "sweep", *arguments, "--out", "out", "--jobs", "2"],
         cwd=tmp_path,
         env=os.environ,
         stderr=subprocess.PIPE,
@@ -139,16 +137,27 @@ def interrupt(tmp_path, sent, *arguments, once="*.parquet"):
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob(f"out/parts/{once}")) and time.monotonic() < deadline:
         time.sleep(0.02)
-    os.killpg(process.pid, sent)
-    _, error = process.communicate(timeout=60)
-    return process.returncode, error
+    os.killpg(running.pid, sent)
+    _, error = running.communicate(timeout=60)
+    return running.returncode, error
+
+
+LONG = ("designed-random", "--set", "encounters.count=3000")
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory):
+    """The rows of a sweep that nothing interrupts."""
+    folder = tmp_path_factory.mktemp("unbroken")
+    arguments = (*LONG, "--method", "acc", "--method", "slot-time")
+    assert merge_cosim("sweep", *arguments, "--out", "whole", cwd=folder).returncode == 0
+    return (folder / "whole/results.parquet").read_bytes()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
-def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent):
-    cases = ("designed-random", "--set", "encounters.count=3000")
-    arguments = (*cases, "--method", "acc", "--method", "slot-time")
+def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent, unbroken):
+    arguments = (*LONG, "--method", "acc", "--method", "slot-time")
     status, error = interrupt(tmp_path, sent, *arguments)
     assert status == (130 if sent == signal.SIGINT else -sent)
     assert ("--resume" in error) == (sent == signal.SIGINT)
@@ -159,12 +168,10 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent):
         refused_without_leave(tmp_path, arguments)
     assert {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")} == kept
     next(tmp_path.glob("out/parts/*.parquet")).write_bytes(b"")  # as after a fault of the disk
-    in_another_order = (*cases, "--method", "slot-time", "--method", "acc")
+    in_another_order = (*LONG, "--method", "slot-time", "--method", "acc")
     resumed = merge_cosim("sweep", *in_another_order, "--out", "out", "--resume", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
-    unbroken = merge_cosim("sweep", *arguments, "--out", "whole", cwd=tmp_path)
-    assert unbroken.returncode == 0
-    assert (tmp_path / "out/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
+    assert (tmp_path / "out/results.parquet").read_bytes() == unbroken
 
 
 def test_an_interrupt_before_the_workers_are_ready_is_one_line(tmp_path):
@@ -342,8 +349,9 @@ def test_a_model_is_not_tested_on_its_own_training_cars(tmp_path, data_dir):
 def test_hidden_intentions_through_the_command_line(tmp_path):
     settings = ("--set", "encounters.count=60", "--set", "merging.sigma=0.2")
     methods = [word for name in ("slot-time", "pgm", "oracle-label", "human") for word in ("--method", name)]
-    arguments = ("designed-3", *settings, *methods, "--against", "slot-time", "--out", "out1")
-    done = merge_cosim("sweep", *arguments, "--jobs", 2, cwd=tmp_path)
+    done = merge_cosim(
+        "sweep", "designed-3", *settings, *methods, "--against", "slot-time", "--out", "out1", cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     rows = summary(tmp_path / "out1")
     assert set(rows) == {"slot-time", "pgm", "oracle-label"}  # nobody was logged

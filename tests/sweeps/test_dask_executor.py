@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from command import merge_cosim, small_scenario
+from command import COMMAND, merge_cosim, run_process, small_scenario
 from scene_files import small_scene
 
 import merge_cosim as merge_cosim_package
@@ -78,7 +78,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path):
     alone = merge_cosim(*arguments, "--out", "alone", "--jobs", 1, cwd=tmp_path)
     assert alone.returncode == 0, alone.stderr
     with cluster(tmp_path / "cluster") as (address, workers):
-        command = [sys.executable, "-m", "merge_cosim.cli.main", *arguments, "--dask", address, "--out", "there"]
+        command = [*COMMAND, *map(str, arguments), "--dask", address, "--out", "there"]
         sweep = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 120
         while not list(tmp_path.glob("there/parts/*.parquet")) and time.monotonic() < deadline:
@@ -95,7 +95,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path):
 @pytest.mark.slow
 def test_workers_with_several_threads_are_refused(tmp_path):
     with cluster(tmp_path / "cluster", workers=1, threads=2) as (address, _):
-        done = merge_cosim("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", address, cwd=tmp_path)
+        done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", address, cwd=tmp_path)
     assert done.returncode == 2
     assert "2 threads" in done.stderr
     assert "--nthreads 1" in done.stderr
@@ -108,7 +108,7 @@ def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path)
     with (other / "units.py").open("a") as file:
         file.write("# edited\n")
     with cluster(tmp_path / "cluster", workers=1, PYTHONPATH=str(other.parent)) as (address, _):
-        done = merge_cosim("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", address, cwd=tmp_path)
+        done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", address, cwd=tmp_path)
     assert done.returncode == 2
     assert re.search(r"worker \S+ has merge-cosim's source [0-9a-f]{16} instead of [0-9a-f]{16}", done.stderr)
     assert len(done.stderr.strip().splitlines()) == 1
@@ -118,7 +118,7 @@ def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path)
 def test_a_local_cluster_gives_the_same_bytes(tmp_path):
     scenarios = small_scenario(tmp_path), small_scene(tmp_path)
     for out, where in (("here", ()), ("there", ("--dask", "local"))):
-        done = merge_cosim("sweep", *scenarios, "--method", "pgm", *where, "--jobs", 2, "--out", out, cwd=tmp_path)
+        done = run_process("sweep", *scenarios, "--method", "pgm", *where, "--jobs", 2, "--out", out, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
     for name in ("results.parquet", "scenes.csv", "notes.csv"):
@@ -126,7 +126,7 @@ def test_a_local_cluster_gives_the_same_bytes(tmp_path):
 
 
 def test_no_scheduler_is_one_line(tmp_path):
-    done = merge_cosim("sweep", small_scenario(tmp_path), "--dask", "tcp://127.0.0.1:9", cwd=tmp_path)
+    done = run_process("sweep", small_scenario(tmp_path), "--dask", "tcp://127.0.0.1:9", cwd=tmp_path)
     assert done.returncode == 2
     assert "no scheduler answers there" in done.stderr.splitlines()[-1]
     assert len(done.stderr.strip().splitlines()) == 1
@@ -135,7 +135,7 @@ def test_no_scheduler_is_one_line(tmp_path):
 def test_without_dask_installed_there_is_one_line(tmp_path):
     (tmp_path / "distributed.py").write_text("raise ImportError('hidden by the test')")
     path = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH", "")]))
-    done = merge_cosim("sweep", small_scenario(tmp_path), "--dask", "local", cwd=tmp_path, PYTHONPATH=path)
+    done = run_process("sweep", small_scenario(tmp_path), "--dask", "local", cwd=tmp_path, PYTHONPATH=path)
     assert done.returncode == 2
     assert "pip install 'merge-cosim[dask]'" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
