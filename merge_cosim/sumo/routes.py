@@ -6,11 +6,11 @@ from pathlib import Path
 from lxml import etree
 
 from merge_cosim.core.encounter import Encounters
-from merge_cosim.core.units import DT
 from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import FILE_NAME as VIEW
 from merge_cosim.ramps.view import copy_view
+from merge_cosim.sumo.options import STEP, WRITTEN, Options
 
 ROLE = "merge-cosim.role"
 """Parameter of a vehicle type: `host` or `merging`."""
@@ -68,20 +68,13 @@ def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) 
     return folder / "encounter.sumocfg"
 
 
-def configuration(
-    inputs: dict[str, str], processing: dict[str, str], with_view: bool, time: dict[str, str]
-) -> etree._Element:
+def configuration(inputs: Options, processing: Options, with_view: bool, time: Options) -> etree._Element:
     """A SUMO configuration with our conditions; further options by section."""
     options = {
         "input": inputs,
         "gui_only": {"gui-settings-file": VIEW} if with_view else {},
-        "time": {"begin": "0", **time, "step-length": _number(DT)},
-        "processing": {
-            "time-to-teleport": "-1",
-            "collision.action": "warn",
-            "no-internal-links": "true",
-            **processing,
-        },
+        "time": {"begin": "0", **time, **STEP},
+        "processing": {**WRITTEN, **processing},
     }
     parts = [element(part, {}, *(element(k, {"value": v}) for k, v in of.items())) for part, of in options.items()]
     return element("configuration", {}, *parts)

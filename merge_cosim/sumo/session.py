@@ -1,312 +1,243 @@
-"""The seam to SUMO: one small protocol, by libsumo in this process or by TraCI to another."""
+"""The seam to a running SUMO: the same calls by libsumo in this process or by TraCI to another."""
 
 from __future__ import annotations
 
-import os
-import sys
-import tempfile
+import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
-from merge_cosim.core.errors import UserError
-from merge_cosim.core.units import DT
+from merge_cosim.sumo.modes import LaneChangeMode, SpeedMode
 
-SPEED_MODE_UNCHECKED = 32
-"""SUMO drives the commanded speed exactly: no safe-speed, right-of-way or acceleration check."""
-LANE_CHANGE_MODE_NONE = 0
-"""SUMO changes no lane by itself."""
-SPEED_MODE_SUMO, LANE_CHANGE_MODE_SUMO = 31, 1621
-"""What SUMO sets itself: it checks everything, and changes lanes as its models wish."""
 SPEED_OF_SUMO = -1.0
-"""The commanded speed that gives a car back to its car-following model."""
-_NO_REASON = "Process Error"
-"""What libsumo raises where it has told the reason elsewhere."""
+"""The commanded speed that gives a vehicle back to its car-following model."""
 _VIEW, _ZOOM = "View #0", 1500.0
 
-
-@dataclass(frozen=True)
-class SumoOptions:
-    """What is set, and recorded, for every SUMO run.
-
-    Attributes:
-        net: The network.
-        seed: SUMO's seed.
-        step_length: Length of a step [s].
-        collision_action: What SUMO does about a contact; `warn` reports it and leaves the cars alone.
-        check_junctions: Contacts on junctions count, too.
-        extra: Further options as SUMO takes them.
-    """
-
-    net: Path
-    seed: int = 0
-    step_length: float = DT
-    collision_action: str = "warn"
-    check_junctions: bool = False
-    extra: tuple[str, ...] = ()
-
-    @property
-    def conditions(self) -> dict[str, str]:
-        """The options that decide how an encounter goes on, by SUMO's names."""
-        return {
-            "step-length": str(self.step_length),
-            "time-to-teleport": "-1",
-            "collision.action": self.collision_action,
-            "collision.mingap-factor": "0",
-            "collision.check-junctions": str(self.check_junctions).lower(),
-        }
-
-    def arguments(self) -> list[str]:
-        """The options as SUMO's command line has them."""
-        options = {
-            "--net-file": self.net,
-            "--seed": self.seed,
-            **{f"--{name}": value for name, value in self.conditions.items()},
-            "--no-step-log": "true",
-            "--no-warnings": "true",
-            "--duration-log.disable": "true",
-            "--xml-validation": "never",
-        }
-        return [str(word) for pair in options.items() for word in pair] + list(self.extra)
+Errors = tuple[type[Exception], ...]
+Color = tuple[int, int, int, int]
+"""Red, green, blue and opacity, 0 to 255."""
 
 
 @dataclass(frozen=True)
 class Car:
-    """A car to put into the simulation.
+    """A car that drives exactly as commanded.
 
     Attributes:
         name: SUMO's vehicle id.
         route: Edge ids.
-        lane: Index of the lane on the first edge that it starts on.
         color: RGBA.
     """
 
     name: str
     route: tuple[str, ...]
-    color: tuple[int, int, int, int]
+    color: Color
 
 
-class Session(Protocol):
-    """What the loop needs of SUMO; ids are SUMO's vehicle ids."""
+class Neighbour(NamedTuple):
+    """A vehicle ahead or behind in the lane; without one the name is empty and the gap inf.
 
-    def add(self, cars: Iterable[Car]) -> None:
-        """Put cars in that drive exactly as commanded; they stand until they are placed."""
+    Attributes:
+        name: SUMO's vehicle id.
+        gap: Gap from bumper to bumper [m]. SUMO itself takes off the minimum gap of the vehicle behind.
+    """
 
-    def place(self, car: str, lane: str, position: float, speed: float) -> None:
-        """Put a car on a lane [SUMO id], its front bumper at `position` [m], as if it had come with `speed` [m/s]."""
+    name: str
+    gap: float
 
-    def set_length(self, car: str, length: float) -> None:
-        """Set a car's length [m]."""
 
-    def change_lane(self, car: str, index: int) -> None:
-        """Bring a car to the lane `index` of its edge within the next step."""
+class Contact(NamedTuple):
+    """A contact of two vehicles that SUMO reports, in the order of their ids, and the lane where it is."""
+
+    one: str
+    other: str
+    lane: str
+
+
+class Session:
+    """A running SUMO. Vehicles, lanes, edges and types are named by SUMO's ids; speeds are in m/s, lengths in m.
+
+    Attributes:
+        step: Simulate one step.
+        set_speed: Command a vehicle's speed of the next steps.
+        lane: Lane that a vehicle is on; empty off the net.
+        lane_position: Position of a vehicle's front bumper on its lane.
+        speed: Speed of a vehicle.
+        edge, route, kind, length, min_gap: Edge, route, type, length and minimum gap of a vehicle.
+        set_length, set_color: Change a vehicle.
+        remove: Take a vehicle out.
+        vehicles, vehicle_count: Vehicles in the net.
+        departed, arrived, arrived_count: Vehicles that came in or left in the last step.
+        teleporting: Vehicles that began to teleport in it.
+        pending: Vehicles that wait outside for room.
+        expected_count: Vehicles in the net or still to come.
+        colliding: Vehicles in a contact that SUMO reports for the last step.
+        lanes, lane_length: All lanes of the net, and the length of one.
+        time: Time of the simulation [s].
+        close: End the simulation, or the connection.
+    """
+
+    def __init__(self, api: Any, errors: Errors = ()) -> None:
+        """Take a running simulation.
+
+        Args:
+            api: The module libsumo or traci, or a connection of traci.
+            errors: What it raises where SUMO refuses something or has ended.
+        """
+        vehicle, simulation = api.vehicle, api.simulation
+        self._api = api
+        self._routes: dict[tuple[str, ...], str] = {}
+        self.errors = errors
+        self.step: Callable[[], object] = api.simulationStep
+        self.close: Callable[[], object] = api.close
+        self.set_speed: Callable[[str, float], object] = vehicle.setSpeed
+        self.lane: Callable[[str], str] = vehicle.getLaneID
+        self.lane_position: Callable[[str], float] = vehicle.getLanePosition
+        self.speed: Callable[[str], float] = vehicle.getSpeed
+        if getattr(api, "__name__", "") == "libsumo":
+            from libsumo import _libsumo as raw  # the raw calls spare a Python frame each
+
+            self.set_speed, self.lane_position = raw.vehicle_setSpeed, raw.vehicle_getLanePosition
+            self.lane, self.speed = raw.vehicle_getLaneID, raw.vehicle_getSpeed
+        self.edge: Callable[[str], str] = vehicle.getRoadID
+        self.route: Callable[[str], tuple[str, ...]] = vehicle.getRoute
+        self.kind: Callable[[str], str] = vehicle.getTypeID
+        self.length: Callable[[str], float] = vehicle.getLength
+        self.min_gap: Callable[[str], float] = vehicle.getMinGap
+        self.set_length: Callable[[str, float], object] = vehicle.setLength
+        self.set_color: Callable[[str, Color], object] = vehicle.setColor
+        self.remove: Callable[[str], object] = vehicle.remove
+        self.vehicles: Callable[[], Sequence[str]] = vehicle.getIDList
+        self.vehicle_count: Callable[[], int] = vehicle.getIDCount
+        self.departed: Callable[[], Sequence[str]] = simulation.getDepartedIDList
+        self.arrived: Callable[[], Sequence[str]] = simulation.getArrivedIDList
+        self.arrived_count: Callable[[], int] = simulation.getArrivedNumber
+        self.teleporting: Callable[[], Sequence[str]] = simulation.getStartingTeleportIDList
+        self.pending: Callable[[], Sequence[str]] = simulation.getPendingVehicles
+        self.expected_count: Callable[[], int] = simulation.getMinExpectedNumber
+        self.colliding: Callable[[], Sequence[str]] = simulation.getCollidingVehiclesIDList
+        self.lanes: Callable[[], Sequence[str]] = api.lane.getIDList
+        self.lane_length: Callable[[str], float] = api.lane.getLength
+        self.time: Callable[[], float] = simulation.getTime
 
     def command(self, cars: Sequence[str], speeds: Sequence[float]) -> None:
-        """Set the speeds [m/s] of the next step."""
-
-    def step(self) -> None:
-        """Simulate one step."""
+        """Set the speeds of the next step of many vehicles."""
+        deque(map(self.set_speed, cars, speeds), maxlen=0)
 
     def positions(self, cars: Sequence[str]) -> Iterable[float]:
-        """Positions [m] of the front bumpers on the cars' present lanes."""
-
-    def colliding(self) -> Sequence[str]:
-        """Cars in a contact that SUMO reports for the last step."""
-
-    def close(self) -> None:
-        """End the simulation."""
-
-
-class RawCalls(NamedTuple):
-    """The two calls that are made for every car in every step."""
-
-    set_speed: Callable[[str, float], None]
-    lane_position: Callable[[str], float]
-
-
-class ApiSession:
-    """What libsumo and TraCI share: the same modules with the same functions."""
-
-    def __init__(self, api: Any, raw: RawCalls) -> None:
-        self._api = api
-        self._raw = raw
-        self.step: Callable[[], None] = api.simulationStep
+        """Positions of the front bumpers of many vehicles on their present lanes."""
+        return map(self.lane_position, cars)
 
     def add(self, cars: Iterable[Car]) -> None:
-        """See `Session`."""
-        vehicle, types = self._api.vehicle, self._api.vehicletype
+        """Put in cars of one type that drive exactly as commanded; they stand until they are placed.
+
+        Raises:
+            RuntimeError: SUMO did not insert them.
+        """
+        types = self._api.vehicletype
         types.copy("DEFAULT_VEHTYPE", "controlled")
         types.setImperfection("controlled", 0.0)
         types.setSpeedDeviation("controlled", 0.0)
         types.setMinGap("controlled", 0.0)
         cars = list(cars)
         for car in cars:
-            self._api.route.add(f"route.{car.name}", car.route)
-            vehicle.add(car.name, f"route.{car.name}", typeID="controlled", departLane="free", departSpeed="0")
-            vehicle.setSpeedMode(car.name, SPEED_MODE_UNCHECKED)
-            vehicle.setLaneChangeMode(car.name, LANE_CHANGE_MODE_NONE)
-            vehicle.setColor(car.name, car.color)
-            vehicle.setSpeed(car.name, 0.0)
+            self.insert(car.name, car.route, "controlled", departLane="free", departSpeed="0")
+            self.set_color(car.name, car.color)
+            self.set_speed(car.name, 0.0)
         self.step()
-        missing = {car.name for car in cars} - set(vehicle.getIDList())
+        missing = {car.name for car in cars} - set(self.vehicles())
         if missing:
             raise RuntimeError(f"SUMO did not insert {sorted(missing)[:3]} ({len(missing)} of {len(cars)} cars)")
 
-    def place(self, car: str, lane: str, position: float, speed: float) -> None:
-        """See `Session`."""
-        self._api.vehicle.moveTo(car, lane, position)
-        self._api.vehicle.setPreviousSpeed(car, speed)
+    def insert(self, car: str, route: tuple[str, ...], kind: str, **departure: str) -> None:
+        """Let a car of a type come in with the next step, or be placed before it; it drives exactly as commanded.
 
-    def set_length(self, car: str, length: float) -> None:
-        """See `Session`."""
-        self._api.vehicle.setLength(car, length)
+        Args:
+            car: Its id.
+            route: Edge ids.
+            kind: Its type.
+            departure: Where and how it departs, by SUMO's names (`departLane`, ...).
+        """
+        if route not in self._routes:
+            self._routes[route] = f"route.{car}"
+            self._api.route.add(self._routes[route], route)
+        self._api.vehicle.add(car, self._routes[route], typeID=kind, **departure)
+        self.take_control(car)
+
+    def take_control(self, car: str) -> None:
+        """From now on a vehicle drives exactly as commanded, and changes lane on command alone."""
+        self._api.vehicle.setSpeedMode(car, SpeedMode.UNCHECKED)
+        self._api.vehicle.setLaneChangeMode(car, LaneChangeMode.NONE)
+
+    def release(self, car: str) -> None:
+        """Give a vehicle back to SUMO's models."""
+        self._api.vehicle.setSpeedMode(car, SpeedMode.SUMO)
+        self._api.vehicle.setLaneChangeMode(car, LaneChangeMode.SUMO)
+        self.set_speed(car, SPEED_OF_SUMO)
+
+    def place(self, car: str, lane: str, position: float, speed: float | None = None) -> None:
+        """Put a car's front bumper at `position` on a lane, as if it had come with `speed` (None: with its own)."""
+        self._api.vehicle.moveTo(car, lane, position)
+        if speed is not None:
+            self._api.vehicle.setPreviousSpeed(car, speed)
 
     def change_lane(self, car: str, index: int) -> None:
-        """See `Session`."""
+        """Bring a car to the lane `index` of its edge within the next step."""
         self._api.vehicle.changeLane(car, index, 0.0)
 
-    def command(self, cars: Sequence[str], speeds: Sequence[float]) -> None:
-        """See `Session`."""
-        deque(map(self._raw.set_speed, cars, speeds), maxlen=0)
+    def stay_on(self, car: str, route: tuple[str, ...]) -> None:
+        """Let a vehicle drive from its present edge along the rest of a route."""
+        self._api.vehicle.setRoute(car, route[route.index(self.edge(car)) :])
 
-    def positions(self, cars: Sequence[str]) -> Iterable[float]:
-        """See `Session`."""
-        return map(self._raw.lane_position, cars)
+    def leader(self, car: str, reach: float) -> Neighbour:
+        """The vehicle ahead in a vehicle's lane and on its route, at most `reach` away."""
+        name, gap = self._api.vehicle.getLeader(car, reach) or ("", 0.0)
+        return Neighbour(name, gap + self.min_gap(car) if name else math.inf)
 
-    def colliding(self) -> Sequence[str]:
-        """See `Session`."""
-        found: Sequence[str] = self._api.simulation.getCollidingVehiclesIDList()
+    def follower(self, car: str, reach: float) -> Neighbour:
+        """The vehicle behind a vehicle in its lane, at most `reach` away."""
+        name, gap = self._api.vehicle.getFollower(car, reach)
+        return Neighbour(name, gap + self.min_gap(name) if name else math.inf)
+
+    def follows_route(self, car: str, lane: str) -> bool:
+        """Whether a lane of a vehicle's present edge leads to the next edge of its route, or the route ends there."""
+        onward = self.route(car)[self._api.vehicle.getRouteIndex(car) + 1 :]
+        return not onward or any(link[0].rpartition("_")[0] == onward[0] for link in self._api.lane.getLinks(lane))
+
+    def parameter(self, car: str, key: str) -> str:
+        """A vehicle's own parameter; empty without one."""
+        return str(self._api.vehicle.getParameter(car, key))
+
+    def kinds(self) -> Sequence[str]:
+        """All types."""
+        found: Sequence[str] = self._api.vehicletype.getIDList()
         return found
 
-    def close(self) -> None:
-        """See `Session`."""
-        self._api.close()
+    def kind_parameter(self, kind: str, key: str) -> str:
+        """A type's parameter; empty without one."""
+        return str(self._api.vehicletype.getParameter(kind, key))
 
+    def contacts(self) -> list[Contact]:
+        """The contacts that SUMO reports for the last step."""
+        simulation = self._api.simulation
+        if not simulation.getCollidingVehiclesNumber():
+            return []
+        found = simulation.getCollisions()
+        return [Contact(min(c.collider, c.victim), max(c.collider, c.victim), c.lane) for c in found]
 
-class LibsumoSession(ApiSession):
-    """SUMO inside this process. libsumo holds one simulation per process: opening a second one ends the first."""
+    def statistic(self, key: str) -> float:
+        """One of SUMO's counts and means over the simulation so far, by SUMO's name (`stats.teleports.total`, ...)."""
+        return float(self._api.simulation.getParameter("", key))
 
-    def __init__(self, options: SumoOptions) -> None:
-        from libsumo import _libsumo as raw  # the raw calls spare a Python frame per car and step
+    def option(self, name: str) -> str:
+        """The value of an option that SUMO was started with."""
+        return str(self._api.simulation.getOption(name))
 
-        libsumo, _ = libsumo_started(options.arguments(), options.net)
-        super().__init__(libsumo, RawCalls(raw.vehicle_setSpeed, raw.vehicle_getLanePosition))
-
-
-class TraciSession(ApiSession):
-    """SUMO, or sumo-gui, in a process of its own."""
-
-    def __init__(self, options: SumoOptions, gui: bool = False) -> None:
-        traci, _ = traci_started(options.arguments(), options.net, gui)
-        super().__init__(traci, RawCalls(traci.vehicle.setSpeed, traci.vehicle.getLanePosition))
+    def has_edge(self, edge: str) -> bool:
+        """Whether the net has an edge."""
+        return edge in self._api.edge.getIDList()
 
     def follow(self, car: str) -> None:
-        """Let the view of sumo-gui follow a car."""
-        follow(self._api, car)
-
-
-def delay_option(milliseconds: float) -> tuple[str, str]:
-    """The option of sumo-gui for a pause with every step, which it counts per simulated second."""
-    return "--delay", str(milliseconds / DT)
-
-
-def follow(api: Any, car: str) -> None:
-    """Let the view of the sumo-gui behind a module traci follow a car."""
-    api.gui.trackVehicle(_VIEW, car)
-    api.gui.setZoom(_VIEW, _ZOOM)
-
-
-def own_traci() -> Any:
-    """The module traci, and not libsumo under its name."""
-    import traci
-
-    if "libsumo" in str(getattr(traci, "__file__", "")):
-        raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
-    return traci
-
-
-@contextmanager
-def connection_kept() -> Iterator[None]:
-    """Turn the end of a SUMO in another process, as when its window is closed, into one line."""
-    try:
-        yield
-    except Exception as error:
-        import traci
-
-        if not isinstance(error, traci.FatalTraCIError):
-            raise
-        raise UserError(f"SUMO has ended before the case was over: {error}") from None
-
-
-Errors = tuple[type[Exception], ...]
-
-
-def libsumo_started(arguments: Sequence[str], file: Path) -> tuple[Any, Errors]:
-    """Start SUMO inside this process and return its module, and the errors that it raises.
-
-    Raises:
-        UserError: SUMO does not start; the line begins with `file`.
-    """
-    import libsumo
-
-    errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
-    with _said() as said:
-        try:
-            libsumo.start(["sumo", *arguments])
-        except errors as error:
-            # Of some mistakes SUMO tells the reason on standard error only.
-            reason = one_line(error)
-            lines = said().splitlines() if reason == _NO_REASON else []
-            reasons = [line.removeprefix("Error: ") for line in lines if line.startswith("Error: ")]
-            raise UserError(f"{file}: SUMO cannot start: {' '.join(reasons) or reason}") from None
-        told = said()
-    sys.stderr.write(told)
-    return libsumo, errors
-
-
-@contextmanager
-def _said() -> Iterator[Callable[[], str]]:
-    """Keep back what this process' libraries write to standard error; the function returns it."""
-    sys.stderr.flush()
-    with tempfile.TemporaryFile() as file:
-
-        def said() -> str:
-            file.seek(0)
-            return file.read().decode(errors="replace")
-
-        kept = os.dup(2)
-        os.dup2(file.fileno(), 2)
-        try:
-            yield said
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-
-
-def traci_started(arguments: Sequence[str], file: Path, gui: bool = False) -> tuple[Any, Errors]:
-    """The same with SUMO, or sumo-gui, in a process of its own."""
-    import sumolib
-
-    traci = own_traci()
-    errors = (traci.TraCIException, traci.FatalTraCIError)
-    command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *arguments]
-    if gui:
-        command += ["--start", "--quit-on-end", "--window-size", "1200,500"]
-    with redirect_stdout(sys.stderr):  # traci prints its attempts to connect
-        _start(lambda: traci.start(command, stdout=sys.stderr), file, errors)
-    return traci, errors
-
-
-def _start(start: Callable[[], object], file: Path, errors: Errors) -> None:
-    try:
-        start()
-    except errors as error:
-        raise UserError(f"{file}: SUMO cannot start: {one_line(error)}") from None
-
-
-def one_line(error: Exception) -> str:
-    """What SUMO says of an error, in one line."""
-    return " ".join(str(error).split()) or "no reason given"
+        """Let the view of sumo-gui follow a vehicle."""
+        self._api.gui.trackVehicle(_VIEW, car)
+        self._api.gui.setZoom(_VIEW, _ZOOM)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import traci
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import Setting
@@ -20,13 +19,15 @@ from merge_cosim.scoring.scoring import Rules
 from merge_cosim.simulation.worlds.host_controller import HostController
 from merge_cosim.simulation.worlds.meetings import DEFAULT_ATTENTION, Attention
 from merge_cosim.sumo.attach import other_net
+from merge_cosim.sumo.listener import StepListener
+from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.tiles import tile_id
 from merge_cosim.sweeps.plan import default_model
 from merge_cosim.sweeps.scene_task import meeting_rows
 from merge_cosim.sweeps.task import free_law
 
 
-class HostListener(traci.StepListener):  # type: ignore[misc]
+class HostListener(StepListener):  # type: ignore[misc]
     """Drives every host of a simulation by a method, after each of the user's `simulationStep()`.
 
     Hosts are the vehicles whose type carries the parameter `merge-cosim.role` = `host`. SUMO runs with steps of 0.1 s
@@ -68,22 +69,23 @@ class HostListener(traci.StepListener):  # type: ignore[misc]
             UserError: There is no such ramp, method or parameter, or SUMO runs on another net, with other steps or with
                 lanes inside junctions.
         """
-        self._api, self._ramp, self._rules = api, Ramp.load(ramp), rules or Rules()
+        self._session, self._ramp, self._rules = Session(api), Ramp.load(ramp), rules or Rules()
         self._method = Method.parse(method, settings)
         if self._method.is_human or self._method.needs_label:
             raise UserError(f"{method}: it rests on a log and cannot drive in living traffic")
         self._model = IntentionModel.load(model or default_model(TRAFFIC)) if self._method.needs_model else None
         self._setting = Setting(speed_limit or self._ramp.speed_limit)
-        if abs(api.simulation.getDeltaT() - DT) > TOLERANCE or api.simulation.getOption("no-internal-links") != "true":
+        session = self._session
+        if abs(float(session.option("step-length")) - DT) > TOLERANCE or session.option("no-internal-links") != "true":
             raise UserError(f"HostListener: start SUMO with --step-length {DT} --no-internal-links true")
         edges = {*self._ramp.main_route, *self._ramp.ramp_route}
-        copied = tile_id(0, self._ramp.main_route[0]) in api.edge.getIDList()
-        if not copied and (amiss := other_net(api, self._ramp.net, edges)):
+        copied = session.has_edge(tile_id(0, self._ramp.main_route[0]))
+        if not copied and (amiss := other_net(session, self._ramp.net, edges)):
             raise UserError(f"HostListener: {amiss}")
-        self._time = api.simulation.getTime()
+        self._time = session.time()
         driver = self._method.driver(self._model)
         self.controller = HostController(
-            api, self._ramp, driver, self._setting, attention, self._rules.horizon, seed, host
+            session, self._ramp, driver, self._setting, attention, self._rules.horizon, seed, host
         )
 
     def step(self, t: float = 0) -> bool:
@@ -92,7 +94,7 @@ class HostListener(traci.StepListener):  # type: ignore[misc]
         Raises:
             UserError: SUMO was asked for several steps at once.
         """
-        time = self._api.simulation.getTime()
+        time = self._session.time()
         if time > self._time + DT + TOLERANCE:
             raise UserError("HostListener: several steps at once; call simulationStep() without a time")
         self._time = time

@@ -18,9 +18,11 @@ from merge_cosim.ramps.view import view_options
 from merge_cosim.simulation.worlds.logged import LoggedWorld
 from merge_cosim.simulation.worlds.tiles import TiledWorld
 from merge_cosim.sumo.attach import Address, AttachedSession
+from merge_cosim.sumo.options import SumoOptions, delay_option
 from merge_cosim.sumo.outputs import SumoOutputs
 from merge_cosim.sumo.routes import write_encounter
-from merge_cosim.sumo.session import Session, SumoOptions, TraciSession, connection_kept, delay_option
+from merge_cosim.sumo.session import Session
+from merge_cosim.sumo.start import TraciSession, connection_kept
 from merge_cosim.sumo.tiles import tile_id
 from merge_cosim.sweeps.full_scene_task import SceneReplay
 from merge_cosim.sweeps.plan import SweepRequest, plan, plan_encounters
@@ -112,7 +114,6 @@ def _open_world(
         return TiledWorld(ramp, 1, batch.seed, extra=extra)
     shown = (*view_options(ramp.net.parent), *delay_option(gui_delay))
     world = TiledWorld(ramp, 1, batch.seed, _open_window, (*shown, *extra))
-    assert isinstance(world.session, TraciSession)
     world.session.follow(tile_id(0, "host"))
     return world
 

@@ -11,7 +11,8 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.simulation.worlds.tiles import TiledWorld
 from merge_cosim.sumo.attach import Address, AttachedSession
-from merge_cosim.sumo.session import SumoOptions, connection_kept
+from merge_cosim.sumo.options import SumoOptions, words
+from merge_cosim.sumo.start import connection_kept
 
 
 @pytest.mark.parametrize("text", ["8813", ":8813", "here:", "here:0", "here:65536", "here:x", "here:-1"])
@@ -26,9 +27,9 @@ def test_the_end_of_sumo_in_mid_run_is_told():
     with socket.socket() as free:
         free.bind(("localhost", 0))
         address = Address("localhost", free.getsockname()[1])
-    conditions = [word for name, value in SumoOptions(ramp.net).conditions.items() for word in (f"--{name}", value)]
+    conditions = words(SumoOptions(ramp.net).conditions)
     command = [sumolib.checkBinary("sumo"), "-n", ramp.net, "--remote-port", str(address.port), *conditions]
-    running = subprocess.Popen([*command, "--no-internal-links"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         world = TiledWorld(ramp, 1, open_session=lambda options: AttachedSession(options, address), tiled=False)
     finally:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
-import sumolib
 from lxml import etree
 
-from merge_cosim.core.errors import UserError
-from merge_cosim.core.units import DT, HOUR
+from merge_cosim.core.units import HOUR
 from merge_cosim.ngsim.surrogate.recipe import Recipe
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.sumo.options import BACKGROUND, SumoOptions, words
+from merge_cosim.sumo.start import run_sumo
 
 _FILES = {"routes": "rou.xml", "signs": "add.xml", "edges": "txt", "fcd": "parquet"}
 
@@ -41,28 +40,17 @@ def simulate(recipe: Recipe, ramp: Ramp, seed: int, end: float, folder: Path) ->
     _write(files["signs"], _signs(recipe, ramp, lanes))
     files["edges"].write_text("".join(f"edge:{edge}\n" for edge in lanes))
     options = {
-        "net-file": ramp.net,
         "route-files": files["routes"],
         "additional-files": files["signs"],
         "end": recipe.warm_up + recipe.duration,
-        "step-length": DT,
-        "seed": seed,
         "lanechange.duration": recipe.change_time,
-        "time-to-teleport": -1,
-        "collision.action": "none",
-        "no-internal-links": "true",
-        "no-step-log": "true",
-        "no-warnings": "true",
         "fcd-output": files["fcd"],
         "fcd-output.attributes": ",".join(COLUMNS),
         "fcd-output.filter-edges.input-file": files["edges"],
         "fcd-output.skip-empty": "true",
         "device.fcd.begin": recipe.warm_up,
     }
-    words = [word for key, value in options.items() for word in (f"--{key}", str(value))]
-    done = subprocess.run([sumolib.checkBinary("sumo"), *words], capture_output=True, text=True, check=False)
-    if done.returncode or not files["fcd"].is_file():
-        raise UserError(f"{ramp.net}: SUMO fails on it: {(done.stderr.strip() or 'no reason given').splitlines()[0]}")
+    run_sumo(SumoOptions(ramp.net, seed, tuple(words(options)), BACKGROUND))
     return files["fcd"]
 
 

@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from merge_cosim.scoring.tracks import DECIMALS
 from merge_cosim.sumo.lanes import Part, RampLane, RampLanes
 from merge_cosim.sumo.routes import ROLE
-from merge_cosim.sumo.session import (
-    LANE_CHANGE_MODE_NONE,
-    LANE_CHANGE_MODE_SUMO,
-    SPEED_MODE_SUMO,
-    SPEED_MODE_UNCHECKED,
-    SPEED_OF_SUMO,
-)
+from merge_cosim.sumo.session import Session
 
 
 @dataclass
@@ -24,7 +17,6 @@ class Actor:
     Attributes:
         name: SUMO's vehicle id.
         length: Its length [m].
-        min_gap: SUMO's minimum gap of it [m], which SUMO takes off the gaps that it reports.
         lane: Where it drives, None off the ramp.
         x: Its front bumper [m past the gore].
         speed: Its speed [m/s].
@@ -36,7 +28,6 @@ class Actor:
 
     name: str
     length: float
-    min_gap: float
     lane: RampLane | None = None
     x: float = 0.0
     speed: float = 0.0
@@ -69,38 +60,38 @@ class Actors:
         came: Names of all hosts that have come in so far.
     """
 
-    def __init__(self, api: Any, lanes: RampLanes, host: str = "") -> None:
-        self._api = api
+    def __init__(self, session: Session, lanes: RampLanes, host: str = "") -> None:
+        self._session = session
         self._lanes = lanes
         self._host = host
         self._role_of_type: dict[str, str] = {}
         self.hosts: dict[str, Actor] = {}
         self.merging: dict[str, Actor] = {}
         self.came: set[str] = set()
-        self._roles_merging = any(self._type_role(kind) == "merging" for kind in api.vehicletype.getIDList())
-        for name in api.vehicle.getIDList():
+        self._roles_merging = any(self._type_role(kind) == "merging" for kind in session.kinds())
+        for name in session.vehicles():
             self._enter(name)
 
     def update(self) -> None:
         """Take in who came and who left in the last step, and where all are."""
-        simulation = self._api.simulation
-        for name in simulation.getArrivedIDList():
+        session, lanes = self._session, self._lanes
+        for name in session.arrived():
             self.hosts.pop(name, None)
             self.merging.pop(name, None)
-        for name in simulation.getDepartedIDList():
+        for name in session.departed():
             self._enter(name)
-        vehicle, lanes = self._api.vehicle, self._lanes
         for actors in (self.hosts, self.merging):
             for actor in actors.values():
-                sumo_lane = vehicle.getLaneID(actor.name)
+                sumo_lane = session.lane(actor.name)
                 if sumo_lane != actor.sumo_lane:
                     actor.sumo_lane, actor.lane = sumo_lane, lanes[sumo_lane]
-                    actor.goes_on = actor.name not in self.hosts or self._goes_on(actor)
+                    any_lane = not sumo_lane or actor.name not in self.hosts
+                    actor.goes_on = any_lane or session.follows_route(actor.name, sumo_lane)
                 lane = actor.lane
-                actor.speed = round(vehicle.getSpeed(actor.name), DECIMALS)
+                actor.speed = round(session.speed(actor.name), DECIMALS)
                 if lane is not None:
                     actor.has_come = True
-                    actor.x = round(lane.start + vehicle.getLanePosition(actor.name), DECIMALS)
+                    actor.x = round(lane.start + session.lane_position(actor.name), DECIMALS)
         for host in self.hosts.values():
             if host.driven != (host.is_on(Part.HOST) and host.goes_on):
                 self._drive(host, not host.driven)
@@ -111,45 +102,38 @@ class Actors:
 
     def role(self, name: str) -> str:
         """`host`, `merging` or nothing."""
-        kind = self._api.vehicle.getTypeID(name)
+        session = self._session
+        kind = session.kind(name)
         if self._host:
             if name == self._host:
                 return "host"
-            route = self._api.vehicle.getRoute(name)
-            if self._host in (kind, name.rpartition(".")[0]) and self._lanes.comes_by_main(route):
+            if self._host in (kind, name.rpartition(".")[0]) and self._lanes.comes_by_main(session.route(name)):
                 return "host"
-        own = self._api.vehicle.getParameter(name, ROLE) or self._type_role(kind)
+        own = session.parameter(name, ROLE) or self._type_role(kind)
         if own or self._roles_merging:
-            return str(own)
-        return "merging" if self._lanes.comes_by_ramp(self._api.vehicle.getRoute(name)) else ""
+            return own
+        return "merging" if self._lanes.comes_by_ramp(session.route(name)) else ""
 
     def _enter(self, name: str) -> None:
-        role, vehicle = self.role(name), self._api.vehicle
+        role = self.role(name)
         if role not in ("host", "merging"):
             return
-        actor = Actor(name, vehicle.getLength(name), vehicle.getMinGap(name))
+        actor = Actor(name, self._session.length(name))
         if role == "merging":
             self.merging[name] = actor
             return
         self.hosts[name] = actor
         self.came.add(name)
 
-    def _goes_on(self, host: Actor) -> bool:
-        vehicle = self._api.vehicle
-        onward = vehicle.getRoute(host.name)[vehicle.getRouteIndex(host.name) + 1 :]
-        if not onward or not host.sumo_lane:
-            return True
-        return any(link[0].rpartition("_")[0] == onward[0] for link in self._api.lane.getLinks(host.sumo_lane))
-
     def _drive(self, host: Actor, method: bool) -> None:
         """Give the wheel to the method, or back to SUMO."""
-        vehicle, host.driven = self._api.vehicle, method
-        vehicle.setSpeedMode(host.name, SPEED_MODE_UNCHECKED if method else SPEED_MODE_SUMO)
-        vehicle.setLaneChangeMode(host.name, LANE_CHANGE_MODE_NONE if method else LANE_CHANGE_MODE_SUMO)
-        if not method:
-            vehicle.setSpeed(host.name, SPEED_OF_SUMO)
+        host.driven = method
+        if method:
+            self._session.take_control(host.name)
+        else:
+            self._session.release(host.name)
 
     def _type_role(self, kind: str) -> str:
         if kind not in self._role_of_type:
-            self._role_of_type[kind] = self._api.vehicletype.getParameter(kind, ROLE)
+            self._role_of_type[kind] = self._session.kind_parameter(kind, ROLE)
         return self._role_of_type[kind]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from copy import deepcopy
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +19,7 @@ from merge_cosim.simulation.worlds.meetings import DEFAULT_ATTENTION, Attention,
 from merge_cosim.simulation.worlds.notes import Event, Notes
 from merge_cosim.simulation.worlds.slots import SlotBatch
 from merge_cosim.sumo.lanes import Part, RampLanes
+from merge_cosim.sumo.session import Session
 
 
 class HostController:
@@ -40,7 +39,7 @@ class HostController:
 
     def __init__(
         self,
-        api: Any,
+        session: Session,
         ramp: Ramp,
         driver: HostDriver,
         setting: Setting,
@@ -52,7 +51,7 @@ class HostController:
         """Take the wheel.
 
         Args:
-            api: The module libsumo or traci, or a connection of traci; a simulation runs behind it.
+            session: A running SUMO.
             ramp: The ramp whose net, or copies of it, is loaded.
             driver: The method.
             setting: The speed that a host drives at if nobody hinders it, and the cycle.
@@ -61,12 +60,12 @@ class HostController:
             seed: Seed of the methods' random streams.
             host: A vehicle, flow or type that is a host without saying so.
         """
-        self._api, self._ramp, self._driver, self._setting = api, ramp, driver, setting
+        self._session, self._ramp, self._driver, self._setting = session, ramp, driver, setting
         self._attention, self._seed = attention, seed
         self._horizon = round(horizon / setting.dt)
         controller = driver.controller
         self._law: FollowingLaw = controller if isinstance(controller, FollowingLaw) else Acc()
-        self._actors = Actors(api, RampLanes(ramp), host)
+        self._actors = Actors(session, RampLanes(ramp), host)
         self._batches: list[SlotBatch] = []
         self._open: dict[Meeting, SlotBatch] = {}
         self._met: dict[str, set[str]] = {}
@@ -83,16 +82,16 @@ class HostController:
         self._begin_meetings()
         hosts = [host for host in self._actors.hosts.values() if host.driven]
         wanted, ahead = self._by_leader(hosts)
-        behind = {name: self._follower_gap(name) for name in {meeting.host.name for meeting in self._open}}
-        contact = set(self._api.simulation.getCollidingVehiclesIDList()) if self._open else set()
+        met = {meeting.host.name for meeting in self._open}
+        behind = {name: self._session.follower(name, SIGHT).gap for name in met}
+        contact = set(self._session.colliding()) if self._open else set()
         for slots in self._batches:
             for meeting, log_odds, acceleration in slots.decide(self._ramp.merging_point):
                 name = meeting.host.name
                 meeting.record(log_odds, *ahead[name], behind[name], {name, meeting.merging.name} <= contact)
                 wanted[name] = min(wanted[name], acceleration)
-        vehicle, dt = self._api.vehicle, self._setting.dt
         for host in hosts:
-            vehicle.setSpeed(host.name, max(host.speed + wanted[host.name] * dt, 0.0))
+            self._session.set_speed(host.name, max(host.speed + wanted[host.name] * self._setting.dt, 0.0))
         self._cycle += 1
 
     @property
@@ -108,7 +107,7 @@ class HostController:
         """
         for meeting in list(self._open):
             self._end(meeting, Ending.CENSORED if meeting.merged_at >= 0 else Ending.NOT_NEXT)
-        waiting = [one for one in self._api.simulation.getPendingVehicles() if self._actors.role(one) == "host"]
+        waiting = [one for one in self._session.pending() if self._actors.role(one) == "host"]
         for name in waiting:
             line = f"host {name} never departed: no room where it was to enter"
             self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
@@ -124,28 +123,19 @@ class HostController:
 
     def _teleported(self) -> int:
         """Teleports so far, as SUMO counts them."""
-        return int(self._api.simulation.getParameter("", "stats.teleports.total"))
+        return int(self._session.statistic("stats.teleports.total"))
 
     def _by_leader(self, hosts: list[Actor]) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
-        """By each host's name: acceleration behind its leader [m/s^2]; the leader's gap and speed [m, m/s].
-
-        SUMO's gaps leave out the minimum gap of the car behind; here they are from bumper to bumper.
-        """
-        vehicle = self._api.vehicle
+        """By each host's name: acceleration behind its leader [m/s^2]; the leader's gap and speed [m, m/s]."""
         ahead = {}
         for host in hosts:
-            name, gap = vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
-            ahead[host.name] = (gap + host.min_gap, vehicle.getSpeed(name)) if name else (math.inf, 0.0)
+            leader = self._session.leader(host.name, SIGHT)
+            ahead[host.name] = (leader.gap, self._session.speed(leader.name) if leader.name else 0.0)
         speed = np.array([host.speed for host in hosts])
         gap, leader_speed = np.array(list(ahead.values())).reshape(-1, 2).T
         led = np.isfinite(gap)
         wanted = self._law.drive(led, np.where(led, gap, 0.0), speed, leader_speed, self._setting.speed_limit)
         return dict(zip(ahead, wanted.tolist(), strict=True)), ahead
-
-    def _follower_gap(self, host: str) -> float:
-        """Gap to the car behind a host, bumper to bumper [m]; inf without one."""
-        name, gap = self._api.vehicle.getFollower(host, SIGHT)
-        return float(gap + self._api.vehicle.getMinGap(name)) if name else math.inf
 
     def _end_meetings(self) -> None:
         """Take in lane changes, end what is over, and forget the merging cars that nobody will meet any more."""
@@ -175,8 +165,8 @@ class HostController:
 
     def _next_to_each_other(self, host: Actor, merging: Actor) -> bool:
         """No car is between the two, which are in one lane."""
-        leader = self._api.vehicle.getLeader(host.name, SIGHT) or ("", 0.0)
-        return merging.name in (leader[0], self._api.vehicle.getFollower(host.name, SIGHT)[0])
+        session = self._session
+        return merging.name in (session.leader(host.name, SIGHT).name, session.follower(host.name, SIGHT).name)
 
     def _end(self, meeting: Meeting, ending: Ending) -> None:
         self._open.pop(meeting).end(meeting)
@@ -218,13 +208,8 @@ class HostController:
                         yield host, merging
 
     def _note_events(self) -> None:
-        simulation = self._api.simulation
-        for name in simulation.getStartingTeleportIDList():
+        for name in self._session.teleporting():
             self.notes.add(Event.TELEPORT, f"{name} {self._cycle}", f"vehicle {name} was teleported by SUMO")
-        if simulation.getCollidingVehiclesNumber():
-            for contact in simulation.getCollisions():
-                pair = sorted((contact.collider, contact.victim))
-                of_host = any(name in self._actors.hosts for name in pair)
-                event = Event.HOST_CONTACT if of_host else Event.OTHER_CONTACT
-                line = f"SUMO reports a contact of {pair[0]} and {pair[1]} on lane {contact.lane}"
-                self.notes.add(event, " ".join(pair), line)
+        for one, other, lane in self._session.contacts():
+            event = Event.HOST_CONTACT if {one, other} & self._actors.hosts.keys() else Event.OTHER_CONTACT
+            self.notes.add(event, f"{one} {other}", f"SUMO reports a contact of {one} and {other} on lane {lane}")

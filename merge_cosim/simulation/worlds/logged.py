@@ -27,7 +27,8 @@ from merge_cosim.simulation.worlds.logged_lanes import Roadway
 from merge_cosim.simulation.worlds.logged_rules import FullScene
 from merge_cosim.simulation.worlds.logged_traffic import LoggedTraffic
 from merge_cosim.simulation.worlds.tiles import COLORS
-from merge_cosim.sumo.session import SumoOptions, delay_option, follow, libsumo_started, traci_started
+from merge_cosim.sumo.options import LOGGED, SumoOptions, delay_option
+from merge_cosim.sumo.start import open_session
 
 Place = tuple[LoggedScene, PairInScene]
 """The scene of an encounter, and where the encounter lies in it."""
@@ -82,9 +83,8 @@ class LoggedWorld:
         self._folder = tempfile.TemporaryDirectory(prefix="merge-cosim-")
         types = Path(self._folder.name) / "types.add.xml"
         rules.drivers.write(types)
-        on_the_net = ("--no-internal-links", "true", "--additional-files", str(types))
         window = () if gui_delay is None else (*view_options(ramp.net.parent), *delay_option(gui_delay))
-        self._options = SumoOptions(ramp.net, seed=seed, extra=(*on_the_net, *window, *extra))
+        self._options = SumoOptions(ramp.net, seed, ("--additional-files", str(types), *window, *extra), LOGGED)
         self._traffic: LoggedTraffic | None = None
 
     def place(self, tiles: IntArray, encounters: Encounters, cases: IntArray) -> None:
@@ -102,18 +102,17 @@ class LoggedWorld:
         self.neighbours = Neighbours(self._lengths[pair.host], SIGHT)
         self.leader_speed = 0.0
         self._others_touched: set[tuple[str, ...]] = set()
-        words, net = self._options.arguments(), self._ramp.net
-        self._api, _ = traci_started(words, net, gui=True) if self._gui else libsumo_started(words, net)
-        self._traffic = LoggedTraffic(self._api, scene, self._ramp, self._rules.drivers)
+        self._session = open_session(self._options, self._gui)
+        self._traffic = LoggedTraffic(self._session, scene, self._ramp, self._rules.drivers)
         self._traffic.advance(pair.start)
         self._step()
-        self._cars = self._api.vehicle.getIDCount()
+        self._cars = self._session.vehicle_count()
         self._traffic.take_over(pair.host)
-        self._take_main_road(pair.host)
+        self._session.stay_on(pair.host, self._ramp.main_route)  # wherever its log leads
         for car, color in zip((pair.host, pair.merging), COLORS, strict=True):
-            self._api.vehicle.setColor(car, color)
+            self._session.set_color(car, color)
         if self._gui:
-            follow(self._api, pair.host)
+            self._session.follow(pair.host)
         shown, given = self._read(), encounters.start[:2, case]
         if not np.allclose(shown, given, rtol=0, atol=TOLERANCE):
             raise RuntimeError(f"{encounters.case[case]}: starts at {given}, its scene has the cars at {shown}")
@@ -123,16 +122,16 @@ class LoggedWorld:
     def advance(self, speeds: FloatArray) -> None:
         """See `World`."""
         assert self._traffic is not None
-        host, merging, vehicle = self._pair.host, self._pair.merging, self._api.vehicle
+        host, merging = self._pair.host, self._pair.merging
         if self._age >= self._takes_over and self._rules.others == "released":
             self._traffic.release_near(host, self._rules.ahead, self._rules.behind, keep=(merging,))
         if self._age == len(self._merging_log) - 1:
             self._traffic.take_over(merging)
         self._age += 1
         self._traffic.advance(self._start + self._age)
-        vehicle.setSpeed(host, float(speeds[0, 0]))
+        self._session.set_speed(host, float(speeds[0, 0]))
         if self._age >= len(self._merging_log):
-            vehicle.setSpeed(merging, float(speeds[1, 0]))
+            self._session.set_speed(merging, float(speeds[1, 0]))
         self._step()
         station = self._read()
         self.state[2:, 0] = (station - self.state[:2, 0]) / DT
@@ -168,28 +167,28 @@ class LoggedWorld:
         counts |= {"driven_through": len(through), "other_contacts": len(touched)}
         self.facts[self._case] = {"cars": self._cars, **counts, "notes": notes}
         self._traffic = None
-        self._api.close()
+        self._session.close()
 
     def _step(self) -> None:
         begin = perf_counter()
-        self._api.simulationStep()
+        self._session.step()
         self.step_s += perf_counter() - begin
 
     def _read(self) -> FloatArray:
         """Take in where all cars are, and return the stations of the encounter's two [m]."""
-        vehicle, x, in_lane = self._api.vehicle, {}, []
-        names = vehicle.getIDList()
+        session, x, in_lane = self._session, {}, []
+        names = session.vehicles()
         for name in names:
-            strip = self._road.at(vehicle.getLaneID(name))
+            strip = self._road.at(session.lane(name))
             if strip is not None:
-                x[name] = strip.start + vehicle.getLanePosition(name)
+                x[name] = strip.start + session.lane_position(name)
                 if strip.lane == self._host_lane and name not in (self._pair.host, self._pair.merging):
                     in_lane.append(InLane(name, x[name], self._lengths[name]))
         self.vehicle_steps += len(names)
         self.neighbours.look(x[self._pair.host], in_lane)
         leader = self.neighbours.leader
-        self.leader_speed = vehicle.getSpeed(leader) if leader else 0.0
-        closing = vehicle.getSpeed(self._pair.host) - self.leader_speed
+        self.leader_speed = session.speed(leader) if leader else 0.0
+        closing = session.speed(self._pair.host) - self.leader_speed
         gap = self.neighbours.leader_gap
         time = max(gap, 0.0) / closing if leader and closing > 0 else math.inf
         for name, value in zip(AROUND, (gap, time, self.neighbours.follower_gap), strict=True):
@@ -198,20 +197,13 @@ class LoggedWorld:
 
     def _touch(self) -> bool:
         """Whether SUMO reports a contact of the encounter's two cars; those of released cars with others are noted."""
-        if not self._api.simulation.getCollidingVehiclesNumber():
+        pairs = {(contact.one, contact.other) for contact in self._session.contacts()}
+        if not pairs:
             return False
         assert self._traffic is not None
-        released, own = set(self._traffic.released), {self._pair.host, self._pair.merging}
-        contacts = [{one.collider, one.victim} for one in self._api.simulation.getCollisions()]
-        self._others_touched |= {
-            tuple(sorted(one)) for one in contacts if one & released and self._pair.host not in one
-        }
-        return own in contacts
-
-    def _take_main_road(self, host: str) -> None:
-        """Let a host stay on the main road, wherever its log leads."""
-        edge, route = self._api.vehicle.getRoadID(host), self._ramp.main_route
-        self._api.vehicle.setRoute(host, route[route.index(edge) :])
+        host, released = self._pair.host, set(self._traffic.released)
+        self._others_touched |= {pair for pair in pairs if released & set(pair) and host not in pair}
+        return tuple(sorted((host, self._pair.merging))) in pairs
 
 
 class _Among(Controller):

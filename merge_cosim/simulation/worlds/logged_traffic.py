@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -13,13 +12,7 @@ from merge_cosim.ngsim.pairing.recordings import LoggedScene
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.simulation.worlds.logged_lanes import Roadway, Strip
 from merge_cosim.simulation.worlds.nearness import Places, in_conflict, near
-from merge_cosim.sumo.session import (
-    LANE_CHANGE_MODE_NONE,
-    LANE_CHANGE_MODE_SUMO,
-    SPEED_MODE_SUMO,
-    SPEED_MODE_UNCHECKED,
-    SPEED_OF_SUMO,
-)
+from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.vehicle_types import LOGGED_TYPE, ReleasedDrivers
 
 _COLORS = {"logged": (150, 160, 170, 255), "released": (240, 160, 30, 255)}
@@ -39,11 +32,13 @@ class LoggedTraffic:
         blocked: Names of the cars that did not come in: a car off its log was too close, or is an earlier part of them.
     """
 
-    def __init__(self, api: Any, scene: LoggedScene, ramp: Ramp, drivers: ReleasedDrivers | None = None) -> None:
+    def __init__(
+        self, session: Session, scene: LoggedScene, ramp: Ramp, drivers: ReleasedDrivers | None = None
+    ) -> None:
         """Prepare a scene.
 
         Args:
-            api: The module libsumo or traci, or a connection of traci; a simulation of the ramp's net runs behind it.
+            session: A running SUMO with the ramp's net.
             scene: The cars.
             ramp: The ramp of the scene's site.
             drivers: Who drives released cars, as in the file that SUMO has loaded; None for the defaults.
@@ -51,7 +46,7 @@ class LoggedTraffic:
         Raises:
             UserError: A log leads off the net.
         """
-        self._api, self._scene, self._drivers = api, scene, drivers or ReleasedDrivers()
+        self._session, self._scene, self._drivers = session, scene, drivers or ReleasedDrivers()
         self._road = Roadway(ramp)
         self._strip = self._road.find(scene.lane, scene.x)
         self._way = _ways(scene)
@@ -59,7 +54,6 @@ class LoggedTraffic:
         self._last = scene.last
         self._cycle: int | None = None
         self._driven: IntArray = np.empty(0, dtype=np.int64)
-        self._routes: set[str] = set()
         self._off_log: list[int] = []
         self.released: list[str] = []
         self.taken: list[str] = []
@@ -74,13 +68,13 @@ class LoggedTraffic:
         """Command the step that leads to `cycle`; the first call may name any, the others follow one by one."""
         if self._cycle is not None and cycle != self._cycle + 1:
             raise ValueError(f"cycle {cycle} does not follow {self._cycle}")
-        scene, vehicle = self._scene, self._api.vehicle
+        scene, session = self._scene, self._session
         for car in self._driven[self._last[self._driven] < cycle]:
-            vehicle.remove(self._names[car])
+            session.remove(self._names[car])
         going = self._driven[self._last[self._driven] >= cycle]
         row = scene.row(going, cycle)
         for car, value in zip(going.tolist(), (self._way[row] / DT).tolist(), strict=True):
-            vehicle.setSpeed(self._names[car], value)
+            session.set_speed(self._names[car], value)
         changing = np.flatnonzero(scene.lane[row] != scene.lane[row - 1])
         for car, at in zip(going[changing].tolist(), row[changing].tolist(), strict=True):
             self._change_lane(car, at)
@@ -106,11 +100,8 @@ class LoggedTraffic:
             ValueError: It is not in the net on its log.
         """
         self._let_go(car)
-        vehicle = self._api.vehicle
-        vehicle.setSpeedMode(car, SPEED_MODE_SUMO)
-        vehicle.setLaneChangeMode(car, LANE_CHANGE_MODE_SUMO)
-        vehicle.setSpeed(car, SPEED_OF_SUMO)
-        vehicle.setColor(car, _COLORS["released"])
+        self._session.release(car)
+        self._session.set_color(car, _COLORS["released"])
         self.released.append(car)
 
     def release_near(
@@ -167,17 +158,15 @@ class LoggedTraffic:
 
     def _enter(self, car: int, row: int) -> None:
         """Put a car where the step that leads to a row starts, in the row's lane."""
-        scene, vehicle, name = self._scene, self._api.vehicle, self._names[car]
+        scene, session, name = self._scene, self._session, self._names[car]
         x = scene.x[row] - self._way[row]
         strip = self._strip_at(int(scene.lane[row]), x)
-        vehicle.add(name, self._route(car, row, strip), typeID=LOGGED_TYPE)
-        vehicle.setLength(name, float(scene.length[car]))
-        vehicle.setSpeedMode(name, SPEED_MODE_UNCHECKED)
-        vehicle.setLaneChangeMode(name, LANE_CHANGE_MODE_NONE)
-        vehicle.setColor(name, _COLORS["logged"])
-        self._place(name, strip, x)
-        vehicle.setPreviousSpeed(name, float(self._way[row] / DT))
-        vehicle.setSpeed(name, float(self._way[row] / DT))
+        speed = float(self._way[row] / DT)
+        session.insert(name, self._route(car, row, strip), LOGGED_TYPE)
+        session.set_length(name, float(scene.length[car]))
+        session.set_color(name, _COLORS["logged"])
+        session.place(name, strip.id, float(x - strip.start), speed)
+        session.set_speed(name, speed)
 
     def _change_lane(self, car: int, row: int) -> None:
         """Bring a car into the lane of a row within the step that leads to it.
@@ -188,24 +177,21 @@ class LoggedTraffic:
         name, strips = self._names[car], self._road.strips
         before, after = strips[self._strip[row - 1]], strips[self._strip[row]]
         if before.edge == after.edge and abs(before.lane_index - after.lane_index) == 1:
-            self._api.vehicle.changeLane(name, after.lane_index, 0.0)
+            self._session.change_lane(name, after.lane_index)
             return
         x = self._scene.x[row - 1]
         strip = self._strip_at(int(self._scene.lane[row]), x)
-        if strip.edge in self._api.vehicle.getRoute(name):
-            self._place(name, strip, x)
+        if strip.edge in self._session.route(name):
+            self._session.place(name, strip.id, float(x - strip.start))
         else:
-            self._api.vehicle.remove(name)
+            self._session.remove(name)
             self._enter(car, row)
-
-    def _place(self, name: str, strip: Strip, x: float) -> None:
-        self._api.vehicle.moveTo(name, strip.id, float(x - strip.start))
 
     def _strip_at(self, lane: int, x: float) -> Strip:
         return self._road.strips[self._road.find(np.array([lane]), np.array([x]))[0]]
 
-    def _route(self, car: int, row: int, first: Strip) -> str:
-        """Name of the route of a car's log from a row to its end, or to a jump across the gore, and from there on."""
+    def _route(self, car: int, row: int, first: Strip) -> tuple[str, ...]:
+        """Edges of a car's log from a row to its end, or to a jump across the gore, and from there on."""
         strips = [first]
         for number in self._strip[row : self._scene.offsets[car + 1]]:
             strip = self._road.strips[number]
@@ -213,12 +199,7 @@ class LoggedTraffic:
                 break
             strips.append(strip)
         from_ramp = self._scene.lane[self._scene.offsets[car]] == self._road.side_lane
-        edges = (*dict.fromkeys(strip.edge for strip in strips), *self._road.onward(strips[-1], bool(from_ramp)))
-        name = "logged." + ".".join(edges)
-        if name not in self._routes:
-            self._routes.add(name)
-            self._api.route.add(name, edges)
-        return name
+        return (*dict.fromkeys(strip.edge for strip in strips), *self._road.onward(strips[-1], bool(from_ramp)))
 
     def _logged_places(self, cars: IntArray, cycle: int) -> Places:
         """Where the logs have cars in a cycle, or in their last one."""
@@ -228,17 +209,18 @@ class LoggedTraffic:
 
     def _free_places(self) -> tuple[list[int], Places]:
         """The cars in the net that are off their logs, and where SUMO has them."""
-        vehicle, present = self._api.vehicle, set(self._api.vehicle.getIDList())
-        cars, places = [], []
+        session, present = self._session, set(self._session.vehicles())
+        cars: list[int] = []
+        places: list[tuple[float, ...]] = []
         for car in self._off_log:
             name = self._names[car]
-            strip = self._road.at(vehicle.getLaneID(name)) if name in present else None
+            strip = self._road.at(session.lane(name)) if name in present else None
             if strip is not None:
-                x = strip.start + vehicle.getLanePosition(name)
+                x = strip.start + session.lane_position(name)
                 cars.append(car)
-                places.append((strip.lane, x, self._scene.length[car], vehicle.getSpeed(name)))
-        lane, x, length, speed = np.array(places).reshape(-1, 4).T
-        return cars, Places(lane.astype(np.int64), x, length, speed)
+                places.append((strip.lane, x, self._scene.length[car], session.speed(name)))
+        lane, *state = np.array(places).reshape(-1, 4).T
+        return cars, Places(lane.astype(np.int64), *state)
 
 
 def _ways(scene: LoggedScene) -> FloatArray:

@@ -11,7 +11,9 @@ import numpy as np
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
 from merge_cosim.ramps.ramp import LanePosition, Ramp, Way
-from merge_cosim.sumo.session import Car, LibsumoSession, Session, SumoOptions
+from merge_cosim.sumo.options import SumoOptions
+from merge_cosim.sumo.session import Car, Session
+from merge_cosim.sumo.start import LibsumoSession
 from merge_cosim.sumo.tiles import tile_id, tile_net
 
 COLORS = ((40, 160, 60, 255), (210, 50, 40, 255))

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import HOUR
 from merge_cosim.ramps.ramp import Ramp
@@ -19,15 +16,10 @@ from merge_cosim.simulation.worlds.host_controller import HostController
 from merge_cosim.simulation.worlds.meeting_scores import to_be_scored
 from merge_cosim.simulation.worlds.meetings import DEFAULT_ATTENTION, Attention, Meeting
 from merge_cosim.simulation.worlds.notes import Event
-from merge_cosim.sumo.attach import Address, attached_to, refuse_other_net
-from merge_cosim.sumo.session import (
-    SumoOptions,
-    connection_kept,
-    delay_option,
-    libsumo_started,
-    one_line,
-    traci_started,
-)
+from merge_cosim.sumo.attach import Address, AttachedSession
+from merge_cosim.sumo.options import TRAFFIC, SumoOptions, delay_option
+from merge_cosim.sumo.session import Session
+from merge_cosim.sumo.start import open_session, running
 
 _STATISTICS = {
     "vehicles": "stats.vehicles.inserted",
@@ -107,12 +99,12 @@ def run_scene(
         attach: Drive the hosts of the SUMO that listens there, whatever its configuration, instead of one of our own.
 
     Raises:
-        UserError: SUMO refuses the configuration, at its start or on the way; or see `attached_to`.
+        UserError: SUMO refuses the configuration, at its start or on the way; or see `AttachedSession`.
     """
-    with _running_sumo(scene, gui_delay, extra, attach) as api:
+    with running(_open(scene, gui_delay, extra, attach), scene.file) as session:
         started = perf_counter()
         controller = HostController(
-            api,
+            session,
             scene.ramp,
             driver,
             setting,
@@ -122,21 +114,21 @@ def run_scene(
             scene.host,
         )
         effort = Effort()
-        simulation, count, arrived = api.simulation, api.vehicle.getIDCount, 0
-        time = begin = simulation.getTime()
-        while time < scene.end and simulation.getMinExpectedNumber() > 0:
+        arrived = 0
+        time = begin = session.time()
+        while time < scene.end and session.expected_count() > 0:
             before = perf_counter()
-            api.simulationStep()
+            session.step()
             effort.step_s += perf_counter() - before
             controller.cycle()
-            effort.vehicle_steps += count()
-            time = simulation.getTime()
+            effort.vehicle_steps += session.vehicle_count()
+            time = session.time()
             if time > scene.warm_up:
-                arrived += simulation.getArrivedNumber()
+                arrived += session.arrived_count()
         controller.close(scene.announced if attach is None else ())
         effort.wall_s, effort.scene_s = perf_counter() - started, time - begin
-        statistics = {name: float(simulation.getParameter("", key)) for name, key in _STATISTICS.items()}
-        left = int(simulation.getParameter("", "device.tripinfo.count"))
+        statistics = {name: session.statistic(key) for name, key in _STATISTICS.items()}
+        left = int(session.statistic("device.tripinfo.count"))
         facts: dict[str, Any] = {
             "simulated_s": round(time - begin, 3),
             "throughput_veh_h": round(HOUR * arrived / max(time - max(scene.warm_up, begin), setting.dt), 1),
@@ -151,38 +143,12 @@ def run_scene(
         return SceneRun(controller.finished, facts, controller.notes.lines, effort, begin)
 
 
-@contextmanager
-def _running_sumo(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], attach: Address | None) -> Iterator[Any]:
+def _open(scene: Scene, gui_delay: int | None, extra: tuple[str, ...], attach: Address | None) -> Session:
     """SUMO with the scene's configuration, under the conditions that the controller rests on."""
-    conditions = SumoOptions(scene.ramp.net).conditions
-    del conditions["time-to-teleport"]  # the user's, whose teleports are counted
-    options = {
-        "configuration-file": scene.file,
-        **conditions,
-        "no-internal-links": "true",
-        "seed": scene.seed,
-        "device.tripinfo.probability": 1,
-        "no-step-log": "true",
-        "no-warnings": "true",
-        "verbose": "false",
-        "duration-log.disable": "true",
-        "duration-log.statistics": "false",
-        "xml-validation": "never",
-    }
-    words = [str(word) for name, value in options.items() for word in (f"--{name}", value)] + list(extra)
-    if attach is not None:
-        api, errors = attached_to(attach, conditions)
-        refuse_other_net(api, scene.ramp.net, {*scene.ramp.main_route, *scene.ramp.ramp_route}, attach)
-    elif gui_delay is None:
-        words += ["--remote-port", "0"]  # SUMO would wait there for somebody
-        api, errors = libsumo_started(words, scene.file)
-    else:
-        words += delay_option(gui_delay)
-        api, errors = traci_started(words, scene.file, gui=True)
-    try:
-        with connection_kept():
-            yield api
-    except errors as error:
-        raise UserError(f"{scene.file}: SUMO stopped: {one_line(error)}") from None
-    finally:
-        api.close()
+    window = () if gui_delay is None else delay_option(gui_delay)
+    options = SumoOptions(scene.ramp.net, scene.seed, (*extra, *window), TRAFFIC, scene.file)
+    if attach is None:
+        return open_session(options, gui=gui_delay is not None)
+    session = AttachedSession(options, attach)
+    session.require_edges({*scene.ramp.main_route, *scene.ramp.ramp_route})
+    return session

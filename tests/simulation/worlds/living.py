@@ -10,6 +10,7 @@ from merge_cosim.estimators.base import estimators
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.simulation.host_driver import HostDriver
 from merge_cosim.simulation.worlds.host_controller import HostController
+from merge_cosim.sumo.session import Session
 
 OTHERS = '<vType id="other" length="6" sigma="0" speedDev="0"/>'
 TYPES = f"""<vType id="host" length="4" minGap="1.5"><param key="merge-cosim.role" value="host"/></vType>
@@ -49,7 +50,7 @@ def us101(tmp_path, *vehicles, types=TYPES, method="always-go", horizon=3.0, hos
         driver = HostDriver(estimators[method](), Acc())
         yield (
             libsumo,
-            HostController(libsumo, ramp, driver, Setting(), horizon=horizon, host=host),
+            HostController(Session(libsumo), ramp, driver, Setting(), horizon=horizon, host=host),
         )
     finally:
         libsumo.close()

@@ -16,7 +16,9 @@ from merge_cosim.ngsim.sites import US101
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.simulation.worlds.logged_lanes import Roadway
 from merge_cosim.simulation.worlds.logged_traffic import LoggedTraffic
-from merge_cosim.sumo.session import LibsumoSession, SumoOptions
+from merge_cosim.sumo.options import LOGGED, SumoOptions
+from merge_cosim.sumo.session import Session
+from merge_cosim.sumo.start import LibsumoSession
 from merge_cosim.sumo.vehicle_types import ReleasedDrivers
 
 RAMP = Ramp.load("us101")
@@ -33,8 +35,7 @@ def sumo(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[None]:
     """A running SUMO with the net and the type of the logged cars, by two car-following models."""
     types = tmp_path / "types.add.xml"
     ReleasedDrivers(car_following=request.param).write(types)
-    extra = ("--no-internal-links", "true", "--additional-files", str(types))
-    session = LibsumoSession(SumoOptions(RAMP.net, extra=extra))
+    session = LibsumoSession(SumoOptions(RAMP.net, extra=("--additional-files", str(types)), profile=LOGGED))
     yield
     session.close()
 
@@ -51,7 +52,7 @@ def shown() -> dict[str, tuple[int, float]]:
 
 def differences(scene: LoggedScene, first: int = 0) -> float:
     """Replay a scene from a cycle on, compare every cycle, and return the worst difference of positions [m]."""
-    traffic = LoggedTraffic(libsumo, scene, RAMP)
+    traffic = LoggedTraffic(Session(libsumo), scene, RAMP)
     worst = 0.0
     for cycle in range(first, scene.cycles + 1):  # one more, in which all are gone
         traffic.advance(cycle)
@@ -103,7 +104,7 @@ def test_a_real_recording_is_replayed(data_dir: Path) -> None:
 
 @pytest.mark.usefixtures("sumo")
 def test_routes_come_from_the_logs() -> None:
-    traffic = LoggedTraffic(libsumo, scene_of(*CARS), RAMP)
+    traffic = LoggedTraffic(Session(libsumo), scene_of(*CARS), RAMP)
     for cycle in range(20):
         traffic.advance(cycle)
         libsumo.simulationStep()
@@ -116,7 +117,7 @@ def test_routes_come_from_the_logs() -> None:
 
 @pytest.mark.usefixtures("sumo")
 def test_cycles_follow_each_other() -> None:
-    traffic = LoggedTraffic(libsumo, scene_of(steady(1, [1] * 9, at=0, frame=5), steady(2, [1], at=0)), RAMP)
+    traffic = LoggedTraffic(Session(libsumo), scene_of(steady(1, [1] * 9, at=0, frame=5), steady(2, [1], at=0)), RAMP)
     traffic.advance(3)
     with pytest.raises(ValueError, match="cycle 5 does not follow 3"):
         traffic.advance(5)
@@ -135,7 +136,7 @@ def platoon() -> LoggedScene:
 
 def stop_the_host(scene: LoggedScene, release: bool) -> tuple[LoggedTraffic, float]:
     """Let car 99 brake to a stop from cycle 20 on, and return the deepest overlap with any car off its log [m]."""
-    traffic = LoggedTraffic(libsumo, scene, RAMP)
+    traffic = LoggedTraffic(Session(libsumo), scene, RAMP)
     deepest, speed = -np.inf, 15.0
     for cycle in range(scene.cycles):
         if cycle == 20:
@@ -187,7 +188,7 @@ def test_released_cars_stop_behind_a_host_where_they_cannot_pass() -> None:
 def test_what_is_near_a_host_is_released_unless_it_is_kept() -> None:
     places = {1: (5, 29.0), 2: (4, 31.0), 3: (4, -59.0), 4: (5, -61.0), 5: (6, 20.0), 6: (3, 1.0), 7: (4, 1.0)}
     cars = [steady(number, [lane] * 30, at=50 + x) for number, (lane, x) in places.items()]
-    traffic = LoggedTraffic(libsumo, scene_of(steady(99, [5] * 30, at=50), *cars), RAMP)
+    traffic = LoggedTraffic(Session(libsumo), scene_of(steady(99, [5] * 30, at=50), *cars), RAMP)
     traffic.advance(0)
     libsumo.simulationStep()
     traffic.take_over("99.1")
@@ -208,7 +209,7 @@ def test_no_car_comes_in_where_another_stands_nor_twice() -> None:
         steady(4, [3] * 10, at=-23.0, frame=20),  # close ahead of it
         steady(5, [3] * 10, at=-15.0, frame=20),
     )
-    traffic = LoggedTraffic(libsumo, scene, RAMP)
+    traffic = LoggedTraffic(Session(libsumo), scene, RAMP)
     for cycle in range(scene.cycles):
         traffic.advance(cycle)
         libsumo.simulationStep()

@@ -1,0 +1,150 @@
+"""Starting SUMO: inside this process by libsumo, in another by TraCI, or to its end without a session."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import sumolib
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.sumo.options import SumoOptions
+from merge_cosim.sumo.session import Session
+
+_NO_REASON = "Process Error"
+"""What libsumo raises where it has told the reason elsewhere."""
+
+
+class LibsumoSession(Session):
+    """SUMO inside this process. libsumo holds one simulation per process: opening a second one ends the first."""
+
+    def __init__(self, options: SumoOptions) -> None:
+        """Start SUMO.
+
+        Raises:
+            UserError: It does not start; the line begins with the file that it is started with.
+        """
+        import libsumo
+
+        errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
+        words = ["--remote-port", "0"]  # with another port in the configuration SUMO would wait there
+        with _said() as said:
+            try:
+                libsumo.start(["sumo", *options.arguments(), *words])
+            except errors as error:
+                # Of some mistakes SUMO tells the reason on standard error only.
+                reason = one_line(error)
+                lines = said().splitlines() if reason == _NO_REASON else []
+                reasons = [line.removeprefix("Error: ") for line in lines if line.startswith("Error: ")]
+                raise UserError(f"{options.file}: SUMO cannot start: {' '.join(reasons) or reason}") from None
+            told = said()
+        sys.stderr.write(told)
+        super().__init__(libsumo, errors)
+
+
+class TraciSession(Session):
+    """SUMO, or sumo-gui, in a process of its own."""
+
+    def __init__(self, options: SumoOptions, gui: bool = False) -> None:
+        """Start SUMO.
+
+        Raises:
+            UserError: It does not start; the line begins with the file that it is started with.
+        """
+        traci = own_traci()
+        errors = (traci.TraCIException, traci.FatalTraCIError)
+        command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *options.arguments()]
+        if gui:
+            command += ["--start", "--quit-on-end", "--window-size", "1200,500"]
+        with redirect_stdout(sys.stderr):  # traci prints its attempts to connect
+            try:
+                traci.start(command, stdout=sys.stderr)
+            except errors as error:
+                raise UserError(f"{options.file}: SUMO cannot start: {one_line(error)}") from None
+        super().__init__(traci, errors)
+
+
+def open_session(options: SumoOptions, gui: bool = False) -> Session:
+    """Start SUMO in this process, or sumo-gui in another."""
+    return TraciSession(options, gui=True) if gui else LibsumoSession(options)
+
+
+def run_sumo(options: SumoOptions) -> None:
+    """Run SUMO in a process of its own to the end of its simulation.
+
+    Raises:
+        UserError: It fails; the line begins with the file that it is started with.
+    """
+    command: Sequence[str] = [sumolib.checkBinary("sumo"), *options.arguments()]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        reason = (done.stderr.strip() or "no reason given").splitlines()[0]
+        raise UserError(f"{options.file}: SUMO fails on it: {reason}")
+
+
+def own_traci() -> Any:
+    """The module traci, and not libsumo under its name."""
+    import traci
+
+    if "libsumo" in str(getattr(traci, "__file__", "")):
+        raise UserError("environment: LIBSUMO_AS_TRACI is set, which turns traci into libsumo; unset it")
+    return traci
+
+
+@contextmanager
+def connection_kept() -> Iterator[None]:
+    """Turn the end of a SUMO in another process, as when its window is closed, into one line."""
+    try:
+        yield
+    except Exception as error:
+        import traci
+
+        if not isinstance(error, traci.FatalTraCIError):
+            raise
+        raise UserError(f"SUMO has ended before the case was over: {error}") from None
+
+
+@contextmanager
+def running(session: Session, file: Path) -> Iterator[Session]:
+    """Use a session and close it; what SUMO refuses on the way is one line that begins with `file`.
+
+    Raises:
+        UserError: SUMO has ended or refuses something.
+    """
+    try:
+        with connection_kept():
+            yield session
+    except session.errors as error:
+        raise UserError(f"{file}: SUMO stopped: {one_line(error)}") from None
+    finally:
+        session.close()
+
+
+def one_line(error: Exception) -> str:
+    """What SUMO says of an error, in one line."""
+    return " ".join(str(error).split()) or "no reason given"
+
+
+@contextmanager
+def _said() -> Iterator[Callable[[], str]]:
+    """Keep back what this process' libraries write to standard error; the function returns it."""
+    sys.stderr.flush()
+    with tempfile.TemporaryFile() as file:
+
+        def said() -> str:
+            file.seek(0)
+            return file.read().decode(errors="replace")
+
+        kept = os.dup(2)
+        os.dup2(file.fileno(), 2)
+        try:
+            yield said
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
