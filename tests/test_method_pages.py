@@ -1,10 +1,11 @@
 """The pages of the methods: their tables are those of the code, and their pictures and links are there."""
 
-import importlib.util
 import re
 from pathlib import Path
 
 import pytest
+from blocks import filled
+from method_pages import parameters
 
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.registry import meanings
@@ -15,18 +16,10 @@ ROOT = Path(__file__).parent.parent
 PAGES = sorted((ROOT / "docs" / "methods").glob("*.md"))
 
 
-@pytest.fixture(scope="module")
-def tool():
-    spec = importlib.util.spec_from_file_location("method_pages", ROOT / "tools" / "method_pages.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_parameters_are_those_of_the_code(page, tool):
+def test_parameters_are_those_of_the_code(page):
     text = page.read_text(encoding="utf-8")
-    assert tool.filled(text, {"parameters": tool.parameters}) == text, "run python tools/method_pages.py"
+    assert filled(text, {"parameters": parameters}) == text, "run python tools/method_pages.py"
 
 
 def test_links_of_all_pages_lead_somewhere():
@@ -36,11 +29,11 @@ def test_links_of_all_pages_lead_somewhere():
     assert [(page.name, link) for page, link in links if not (page.parent / link).exists()] == []
 
 
-def test_a_stale_table_is_seen(tool):
+def test_a_stale_table_is_seen():
     stale = "<!-- parameters: estimator pgm -->\n| parameter | default |\n<!-- end -->"
-    made = tool.filled(stale, {"parameters": tool.parameters})
+    made = filled(stale, {"parameters": parameters})
     assert "| `pgm.nodes` | `52` | Number n of speed nodes;" in made
-    assert tool.filled(stale, {}) == stale
+    assert filled(stale, {}) == stale
 
 
 @pytest.mark.parametrize("name", [*estimators.names(), *controllers.names()])

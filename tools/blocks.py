@@ -1,9 +1,31 @@
-"""Blocks of hand-written pages that a tool fills: `<!-- KIND: ARGUMENT -->` ... `<!-- end -->`."""
+"""What the tools that make pages of the docs share: their options, tables, and the blocks that they fill.
+
+A block is `<!-- KIND: ARGUMENT -->` ... `<!-- end -->` in a page that is otherwise written by hand.
+"""
 
 import re
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+DOCS = Path(__file__).parent.parent / "docs"
 
 BLOCK = re.compile(r"<!-- (?P<kind>\w+): (?P<argument>[^>]+) -->\n.*?<!-- end -->", re.DOTALL)
+
+
+def page_parser(about: str | None) -> ArgumentParser:
+    """The options of every page tool."""
+    parser = ArgumentParser(description=about, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("--docs", type=Path, default=DOCS, help="folder that the page is written into")
+    parser.add_argument("--short", action="store_true", help="few cases: a check of the tool; its figures mean nothing")
+    return parser
+
+
+def fill_page(name: str, docs: Path, kinds: Mapping[str, Callable[[str], str | None]]) -> None:
+    """Write the page `name` of the docs, its blocks filled anew, into the folder `docs`."""
+    target = docs / name
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(filled((DOCS / name).read_text(encoding="utf-8"), kinds), encoding="utf-8")
 
 
 def filled(text: str, kinds: Mapping[str, Callable[[str], str | None]]) -> str:

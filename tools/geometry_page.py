@@ -1,6 +1,5 @@
 """Judge the drawn ramps by logged positions: python tools/geometry_page.py --data DIR writes docs/geometry.md."""
 
-import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -10,6 +9,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from blocks import page_parser, table
 from geometry.lines import SURVEY_FOOT, FloatArray, Line, read_lines
 from geometry.plan import Plan
 from geometry.positions import positions
@@ -22,7 +22,6 @@ from merge_cosim.core.units import FOOT
 from merge_cosim.ramps.definition import read_ramp_file
 from merge_cosim.ramps.ramp import Ramp, read_net
 
-DOCS = Path(__file__).parent.parent / "docs"
 TITLES = {"us101": "US-101", "i80": "I-80"}
 SHOWN = {"us101": (-190.0, 480.0), "i80": (-160.0, 260.0)}
 """Part of the road in the pictures [m past the gore]."""
@@ -32,11 +31,11 @@ AS_GOOD = 1.05
 """A shift is as good as the best if its residual is at most so many times as large."""
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A Markdown table, numbers to the right."""
-    cells = [[f"{cell:.2f}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
-    lines = [head, ["---", *["---:"] * (len(head) - 1)], *cells]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+def numbers(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A Markdown table, fractions with two decimals."""
+    return table(
+        head, [[f"{cell:.2f}" if isinstance(cell, float) else str(cell) for cell in row] for row in rows]
+    ).rstrip()
 
 
 def residuals(ramp: Ramp, plan: Plan, cars: pd.DataFrame) -> str:
@@ -48,7 +47,7 @@ def residuals(ramp: Ramp, plan: Plan, cars: pd.DataFrame) -> str:
         for a, o, r in zip(by_all, by_others, by_rows, strict=True)
     ]
     head = ["lane", "median", "95 %", "cars", "rows", "odd: median", "95 %", "to the right", "cars"]
-    return table([*head, "rows only: median", "95 %"], rows)
+    return numbers([*head, "rows only: median", "95 %"], rows)
 
 
 def shapes(ramp: Ramp, plan: Plan, drawn: dict[str, Line]) -> str:
@@ -62,7 +61,7 @@ def shapes(ramp: Ramp, plan: Plan, drawn: dict[str, Line]) -> str:
         points = points[(along > 0.0) & (along < centres[number].length) & (x < plan.surveyed["main_after"])]
         off = np.abs(centres[number].locate(points)[1])
         rows.append([number, float(np.median(off)), float(np.percentile(off, 95)), float(off.max())])
-    return table(("lane", "median", "95 %", "largest"), rows)
+    return numbers(("lane", "median", "95 %", "largest"), rows)
 
 
 def along_road(plan: Plan, drawn: Line, cars: pd.DataFrame) -> str:
@@ -77,7 +76,7 @@ def along_road(plan: Plan, drawn: Line, cars: pd.DataFrame) -> str:
             spread.append(np.median(np.abs(right - np.median(right))))
         good = SHIFTS[np.array(spread) <= AS_GOOD * min(spread)]
         rows.append([number, f"{SHIFTS[int(np.argmin(spread))]:.0f}", f"{good.min():.0f} ... {good.max():.0f}"])
-    return table(("lane", "best shift [m]", f"within {AS_GOOD - 1:.0%} of the best"), rows)
+    return numbers(("lane", "best shift [m]", f"within {AS_GOOD - 1:.0%} of the best"), rows)
 
 
 def ties(name: str, ramp: Ramp, plan: Plan) -> str:
@@ -115,9 +114,9 @@ def draw(ramp: Ramp, plan: Plan, cars: pd.DataFrame, target: Path) -> None:
     half = max(edge.width for edge in plan.edges) / 2
     panels[1].set(xlim=SHOWN[ramp.name], ylim=(half + 10, -half - 2), xlabel="past the gore, along the road [m]")
     panels[1].set(ylabel="to the right [m]")
-    numbers = sorted(set(cars["Lane_ID"]))
-    marks = [plt.Line2D([], [], marker="o", linestyle="", color=plt.get_cmap("tab10")(n - 1)) for n in numbers]
-    panels[1].legend(marks, [f"lane {n}" for n in numbers], ncols=len(numbers), frameon=False, loc="lower right")
+    present = sorted(set(cars["Lane_ID"]))
+    marks = [plt.Line2D([], [], marker="o", linestyle="", color=plt.get_cmap("tab10")(n - 1)) for n in present]
+    panels[1].legend(marks, [f"lane {n}" for n in present], ncols=len(present), frameon=False, loc="lower right")
     figure.savefig(target, dpi=80)
     plt.close(figure)
 
@@ -132,11 +131,11 @@ def lanes(panel: Axes, ramp: Ramp, origin: FloatArray, view: Callable[[FloatArra
                 panel.plot(*view(line.place(stations, side * lane.getWidth())).T, color="0.35", linewidth=0.8, zorder=2)
 
 
-def section(name: str, data: Path) -> str:
-    """One site: widths, tables and a picture."""
+def section(name: str, data: Path, docs: Path) -> str:
+    """One site: widths, tables, and a picture in the folder of the page."""
     ramp, plan, cars = Ramp.load(name), plan_of(name, data, read_ramp_file(NETS / name)), positions(data, name)
     drawn = read_lines(data / "geometry" / f"centerlines{'101' if name == 'us101' else '80'}.txt")
-    draw(ramp, plan, cars, DOCS / "img" / f"geometry-{name}.png")
+    draw(ramp, plan, cars, docs / "img" / f"geometry-{name}.png")
     beside = plan.edges[1]
     widths = ", ".join(f"{width:.2f}" for _, width in reversed(beside.lanes))
     parts = [
@@ -239,13 +238,15 @@ TAIL = """\
 """
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with geometry/ and NGSIM's trajectories")
-    data = parser.parse_args().data
-    parts = [HEAD.strip(), *(section(name, data) for name in TITLES), TAIL.strip()]
-    (DOCS / "geometry.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    given = parser.parse_args(argv)
+    (given.docs / "img").mkdir(parents=True, exist_ok=True)
+    names = list(TITLES)[-1:] if given.short else TITLES
+    parts = [HEAD.strip(), *(section(name, given.data, given.docs) for name in names), TAIL.strip()]
+    (given.docs / "geometry.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

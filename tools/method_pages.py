@@ -6,19 +6,18 @@ parameters of a component with their defaults (`parameters: estimator pgm`), and
 model learned, and what the estimators believe.
 """
 
-import argparse
 import tempfile
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from blocks import filled, table
+from blocks import DOCS, fill_page, page_parser, table
 
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.registry import Registry, meanings
 from merge_cosim.core.registry import parameters as defaults
 from merge_cosim.estimators.base import estimators
 
-DOCS = Path(__file__).parent.parent / "docs"
 MODEL = "us101-ngsim"
 REGISTRIES: dict[str, Registry] = {"estimator": estimators, "controller": controllers}
 
@@ -32,9 +31,12 @@ def parameters(argument: str) -> str:
     return table(["parameter", "default", "meaning"], rows, left=3) if rows else "No parameters.\n"
 
 
-def densities(argument: str, data: Path | None = None) -> str | None:
-    """Losses of the densities on held-out cars; `argument` is the source."""
-    if argument == "ngsim" and data is None:
+def densities(argument: str, data: Path | None = None, short: bool = False) -> str | None:
+    """Losses of the densities on held-out cars; `argument` is the source.
+
+    None, so that the block stays, without the real data, and in short mode for the surrogate, which takes a minute.
+    """
+    if data is None if argument == "ngsim" else short:
         return None
     from merge_cosim.studies.judging import DENSITIES
     from merge_cosim.studies.training import train
@@ -56,13 +58,12 @@ def densities(argument: str, data: Path | None = None) -> str | None:
     return about + table(head, rows, left=2)
 
 
-def draw() -> None:
-    """Draw what the shipped model learned, and what the estimators believe."""
+def draw(folder: Path) -> None:
+    """Draw what the shipped model learned, and what the estimators believe, into a folder."""
     from merge_cosim.estimators.learned.model import IntentionModel
     from merge_cosim.report import belief_figures, canvas, model_figures
 
     model = IntentionModel.load(MODEL)
-    folder = DOCS / "img" / "methods"
     folder.mkdir(parents=True, exist_ok=True)
     figures = {
         "transitions": model_figures.transition_figure,
@@ -78,15 +79,15 @@ def draw() -> None:
             figure(model).savefig(folder / f"{name}.png", dpi=110, metadata={"Software": None})
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Rewrite the pages and redraw the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, help="folder with real NGSIM files")
-    data = parser.parse_args().data
-    kinds = {"parameters": parameters, "densities": partial(densities, data=data)}
+    given = parser.parse_args(argv)
+    kinds = {"parameters": parameters, "densities": partial(densities, data=given.data, short=given.short)}
     for page in sorted((DOCS / "methods").glob("*.md")):
-        page.write_text(filled(page.read_text(encoding="utf-8"), kinds), encoding="utf-8")
-    draw()
+        fill_page(f"methods/{page.name}", given.docs, kinds)
+    draw(given.docs / "img" / "methods")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ trains each model anew into a scratch folder, by the function behind `merge-cosi
 comes with the project is the same byte by byte, and sets the judgement on held-out merging cars out as tables.
 """
 
-import argparse
 import re
 import tempfile
 import textwrap
@@ -15,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from blocks import page_parser
+from blocks import table as markdown
 
 from merge_cosim.core.encounter import Encounters, Intention
 from merge_cosim.core.errors import UserError
@@ -23,16 +24,14 @@ from merge_cosim.scenarios.encounters import SourceChoice, pairs_of_site
 from merge_cosim.scenarios.sources import Pairs
 from merge_cosim.studies.training import train
 
-PAGE = Path(__file__).parent.parent / "docs" / "models.md"
 SPEAKS_FOR = {"YIELD": Intention.YIELD, "NOT_YIELD": Intention.NOT_YIELD}
 HEAD = """\
 # The models
 
 What `pgm` and its kin learn from data: how speeds go on, the two times to arrival, and how often drivers yield, each
 for the merging cars that yield and those that do not. A model is one readable JSON file of counts in
-[estimators/learned/models/](../merge_cosim/estimators/learned/models), with the keys of the merging cars it was
-trained on; a
-sweep refuses to test it on these. A sweep takes the model of its data: `us101-ngsim` on real data and on the designed
+`merge_cosim/estimators/learned/models/`, with the keys of the merging cars it was trained on; a sweep
+refuses to test it on these. A sweep takes the model of its data: `us101-ngsim` on real data and on the designed
 grid, `us101-surrogate` on surrogate data; `--model FILE` takes another.
 
 Made by `python tools/models_page.py --data DIR` with the NGSIM files in `DIR`. It trains every model again; {same}.
@@ -73,7 +72,7 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     distances = list(dict.fromkeys(row["distance_m"] for row in rows))
     frames = {row["distance_m"]: row["frames"] for row in rows}
     head = ["accuracy % (log loss)", *(f"{d.replace('-inf', ' and more')} m" for d in distances)]
-    lines = [head, ["---", *["---:"] * len(distances)], ["frames", *(f"{frames[d]:,}" for d in distances)]]
+    lines = [["frames", *(f"{frames[d]:,}" for d in distances)]]
     for name in dict.fromkeys(row["estimator"] for row in rows):
         of = {row["distance_m"]: row for row in rows if row["estimator"] == name}
         cells = [
@@ -83,7 +82,7 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
             for d in distances
         ]
         lines.append([f"`{name}`", *cells])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown(head, lines).rstrip()
 
 
 def better(name: str, rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -131,13 +130,14 @@ YIELD, {other} NOT_YIELD; {both} of the {cars} cars stand in both classes), one 
 """
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Train all models again and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with real NGSIM files")
-    data = parser.parse_args().data
+    given = parser.parse_args(argv)
+    data = given.data
     sections, both, same, wins, frames, cars = [], [], [], [], 0, 0
-    for file in sorted(MODELS.glob("*.json")):
+    for file in sorted(MODELS.glob("*-ngsim.json" if given.short else "*.json")):  # the surrogate takes a minute
         model = IntentionModel.load(file)
         source: SourceChoice = "ngsim" if model.source == "ngsim" else "surrogate"
         split, seed = model.settings["split"], model.settings["seed"]
@@ -165,7 +165,7 @@ def main() -> None:
     head = HEAD.format(same=said) + "\n" + HELD_OUT
     tail = TAIL.format(both=" and ".join(both), better=", ".join(wins) or "none", frames=f"{frames:,}", cars=cars)
     text = "\n\n".join([head.strip(), *(part.strip() for part in sections), tail.strip()])
-    PAGE.write_text(wrapped(text) + "\n", encoding="utf-8")
+    (given.docs / "models.md").write_text(wrapped(text) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

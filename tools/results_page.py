@@ -4,21 +4,25 @@ The page is written by hand but for its blocks `<!-- table: NAME [COLUMN,...] --
 from `REPRODUCTION/tables/NAME.csv`, a folder that `merge-cosim reproduce` wrote.
 """
 
-import argparse
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 import pandas as pd
-from blocks import filled, table
-
-PAGE = Path(__file__).parent.parent / "docs" / "results.md"
+from blocks import fill_page, page_parser, table
 
 
-def shown(folder: Path, argument: str) -> str:
-    """A table of the folder, or some of its columns, as a Markdown table; rates with two decimals."""
+def shown(folder: Path, short: bool, argument: str) -> str | None:
+    """A table of the folder, or some of its columns, as a Markdown table; rates with two decimals.
+
+    In short mode a table that the folder does not hold is left as it is, and so are columns left out.
+    """
     name, _, columns = argument.partition(" ")
+    if short and not (folder / "tables" / f"{name}.csv").exists():
+        return None
     rows = pd.read_csv(folder / "tables" / f"{name}.csv").convert_dtypes()  # counts stay whole beside missing ones
-    rows = rows[columns.split(",")] if columns else rows
+    if columns:
+        rows = rows[[column for column in columns.split(",") if not short or column in rows]]
     cells = [
         ["–" if pd.isna(v) else f"{v:.2f}" if isinstance(v, float) else str(v) for v in values]
         for values in rows.itertuples(index=False)
@@ -26,12 +30,12 @@ def shown(folder: Path, argument: str) -> str:
     return table([str(name).replace("_", " ") for name in rows], cells, left=len(rows.columns))
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Rewrite the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = page_parser(__doc__)
     parser.add_argument("folder", type=Path, help="folder that merge-cosim reproduce wrote")
-    folder = parser.parse_args().folder
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), {"table": partial(shown, folder)}), encoding="utf-8")
+    given = parser.parse_args(argv)
+    fill_page("results.md", given.docs, {"table": partial(shown, given.folder, given.short)})
 
 
 if __name__ == "__main__":

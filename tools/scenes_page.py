@@ -4,13 +4,13 @@ The page is written by hand but for its blocks `<!-- table: NAME -->` ... `<!-- 
 on; one that is there already and the same is not run again. Beside `full_scene` as shipped, its variations are run.
 """
 
-import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from blocks import filled, table
+from blocks import fill_page, page_parser, table
 
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.store import SCENES_CSV, ResultFolder
@@ -18,7 +18,6 @@ from merge_cosim.sweeps.full_scene_task import SceneReplay
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.sweep import sweep
 
-PAGE = Path(__file__).parent.parent / "docs" / "scenes.md"
 METHODS = ("acc", "slot", "pgm", "fg", "ipcb", "always-go", "always-yield")
 ALONE, LOG, RELEASED, BLIND = "the pair alone", "log", "released", "log, leader not heeded"
 RUNS = {
@@ -28,6 +27,8 @@ RUNS = {
     ("us101-scene", "full_scene.others=released"): RELEASED,
 }
 """What is compared, by scenario and variation."""
+SHORT = {"encounters.fraction": 0.97}
+"""Settings of the short mode: most pairs are left for training, so that few are tested."""
 
 
 def kind(case: str) -> str:
@@ -35,13 +36,12 @@ def kind(case: str) -> str:
     return "episodes" if case.startswith("episode") else "fragments"
 
 
-def run_all(data: Path, out: Path, jobs: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+def run_all(base: SweepRequest, out: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Result rows of all runs, and facts of their scenes, with the columns `run` and `kind`."""
     variations = [("full_scene.others", ["released"]), ("full_scene.heed_leader", [False])]
     rows, facts = [], []
     for name, varied in (("us101-replay", []), ("us101-scene", variations)):
-        request = SweepRequest([name], METHODS, variations=varied, data=data, source="ngsim", jobs=jobs)
-        sweep(request, out / name, resume=True)
+        sweep(replace(base, scenarios=[name], variations=varied), out / name, resume=True)
         rows.append(ResultFolder(out / name).results().to_pandas())
         if varied:
             facts.append(pd.read_csv(out / name / SCENES_CSV, keep_default_na=False))
@@ -56,9 +56,10 @@ def _joined(parts: list[pd.DataFrame], case: str) -> pd.DataFrame:
 
 def by_method(frame: pd.DataFrame, runs: tuple[str, ...], cell: Callable[[pd.DataFrame], str], what: str = "") -> str:
     """One row per method, one column per kind of recording and run."""
-    columns = [(one, run) for one in ("fragments", "episodes") for run in runs]
+    columns = [(one, run) for one in sorted(set(frame["kind"]), reverse=True) for run in runs]  # fragments first
     groups = dict(list(frame.groupby(["method", "kind", "run"])))
-    lines = [[method, *(cell(groups[method, *column]) for column in columns)] for method in METHODS]
+    methods = [method for method in METHODS if method in set(frame["method"])]
+    lines = [[method, *(cell(groups[method, *column]) for column in columns)] for method in methods]
     return table([what, *(f"{one}: {run}" for one, run in columns)], lines)
 
 
@@ -89,9 +90,9 @@ def handed(facts: pd.DataFrame) -> str:
     return f"{facts['released'].mean():.1f} / {facts['blocked'].mean():.1f}"
 
 
-def replay(data: Path) -> SceneReplay:
+def replay(base: SweepRequest) -> SceneReplay:
     """All cases."""
-    (batch,) = plan(SweepRequest(["us101-scene"], ["acc"], data=data, source="ngsim"))
+    (batch,) = plan(replace(base, scenarios=["us101-scene"], methods=["acc"]))
     assert isinstance(batch, SceneReplay)
     return batch
 
@@ -106,7 +107,7 @@ def starts(batch: SceneReplay) -> str:
         found[kind(batch.case(number))].append(gap)
     world.close()
     lines = []
-    for name, gaps in found.items():
+    for name, gaps in ((name, gaps) for name, gaps in found.items() if gaps):
         led = np.array([gap for gap in gaps if np.isfinite(gap)])
         below = [str(int((led < limit).sum())) for limit in (1.0, 1.5)]
         lines.append([name, str(len(gaps)), str(len(led)), f"{np.median(led):.1f}", *below])
@@ -138,15 +139,18 @@ def groups(batch: SceneReplay) -> Iterator[tuple[str, list]]:
     yield from sorted(named.items(), key=lambda item: (item[0] == "episodes", item[0]))
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Fill the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with real NGSIM files")
     parser.add_argument("--out", type=Path, required=True, help="folder for the sweeps")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
-    given = parser.parse_args()
-    rows, facts = run_all(given.data, given.out, given.jobs)
-    batch = replay(given.data)
+    given = parser.parse_args(argv)
+    base = SweepRequest((), METHODS, data=given.data, source="ngsim", jobs=given.jobs)
+    if given.short:
+        base = replace(base, methods=METHODS[:1], settings=SHORT)
+    rows, facts = run_all(base, given.out)
+    batch = replay(base)
     tables = {
         "fullness": fullness(batch),
         "starts": starts(batch),
@@ -156,9 +160,7 @@ def main() -> None:
         "through": by_method(facts, (BLIND, LOG, RELEASED), through),
         "released": by_method(facts, (RELEASED,), handed),
     }
-
-    kinds = {"table": lambda name: f"\n{tables[name]}\n"}
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), kinds), encoding="utf-8")
+    fill_page("scenes.md", given.docs, {"table": lambda name: f"\n{tables[name]}\n"})
 
 
 if __name__ == "__main__":

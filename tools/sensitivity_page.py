@@ -6,17 +6,17 @@ runs one `merge-cosim sweep` with a `--vary` per choice (about a quarter of an h
 out as tables, each row one value, each column one method, with what they show put into words by rule.
 """
 
-import argparse
 import shlex
-import subprocess
-import sys
 import tempfile
 import textwrap
+from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
 
 import pandas as pd
+from blocks import page_parser
 
+from merge_cosim.cli.main import app
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.registry import parameters
 from merge_cosim.ramps.ramp import Ramp
@@ -28,7 +28,7 @@ RIVALS = ("acc", "slot", "slot-time", "pgm")
 """The methods whose order matters; the others are bounds."""
 CHOICES = {
     "merging.ahead=clear,in-lane,any": "When the designed merging car takes the host to be ahead of it",
-    "speed_limit=12,15,20,25,29,33": "Speed limit [m/s]: how fast a host drives that nobody hinders",
+    "speed_limit=12,15,20,25,29,33": "Speed limit [m/s]: how fast a host drives with no car ahead",
     "acc.min_acceleration=-8,-6,-4,-3,-2": "Hardest braking of the host [m/s²]",
     "acc.max_acceleration=1,1.5,2,3,4": "Hardest acceleration of the host [m/s²]",
     "acc.headway=0.5:2.5:0.5": "Time headway of the host's distance keeping [s]",
@@ -43,6 +43,9 @@ CHOICES = {
 }
 WEAK = 0.5
 """Points below which a choice counts as one that hardly matters."""
+SHORT = ("merging.ahead=any", "acc.d0=0")
+"""Choices of the short mode, on a part of the grid alone."""
+COARSE = ("host_offset.step=5", "host_speed.step=8", "merging_speed.step=8")
 HEAD = """# Sensitivity to what the papers leave open
 
 Failure rate in per cent by method, for each choice by itself, everything else as in the scenario file. The value that
@@ -61,30 +64,32 @@ followed by `python tools/sensitivity_page.py --from {out}`.
 """
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Run the sweep, if need be, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = page_parser(__doc__)
     parser.add_argument("--data", help="folder with NGSIM files")
     parser.add_argument("--from", dest="folder", type=Path, help="result folder of the sweep, if it was run already")
-    parser.add_argument("--page", type=Path, default=Path("docs/sensitivity.md"))
-    arguments = parser.parse_args()
-    words = ["merge-cosim", "sweep", "designed-2", "us101-replay"]
+    arguments = parser.parse_args(argv)
+    choices = SHORT if arguments.short else tuple(CHOICES)
+    words = ["merge-cosim", "sweep", "designed-2", *(() if arguments.short else ("us101-replay",))]
     words += [word for method in METHODS for word in ("--method", method)]
-    words += [word for choice in CHOICES for word in ("--vary", choice)]
+    words += [word for choice in choices for word in ("--vary", choice)]
+    if arguments.short:
+        words += ["--jobs", "1", *(word for step in COARSE for word in ("--set", f"encounters.{step}"))]
     folder = arguments.folder
     if folder is None:
         folder = Path(tempfile.mkdtemp(prefix="sensitivity-")) / "out"
         data = ["--data", arguments.data] if arguments.data else []
-        subprocess.run([sys.executable, "-m", "merge_cosim.cli.main", *words[1:], *data, "--out", folder], check=True)
+        app([*words[1:], *data, "--out", str(folder)], standalone_mode=False)
     rows = pd.read_json(folder / "summary.json", dtype={"variation": str})
     real = (rows.loc[rows["scenario"] == "us101-replay", "source"] == "ngsim").all()
     source = "real NGSIM data (fragments and merging episodes)" if real else "the SYNTHETIC surrogate"
     command = " ".join(shlex.quote(word) for word in [*words, *(["--data", "DIR"] if real else []), "--out", "OUT"])
     parts = [HEAD.format(source=source, command=command.replace(" --", " \\\n    --"), out="OUT")]
     parts.append(findings(rows))
-    for choice, title in CHOICES.items():
-        parts.append(section(rows, choice.partition("=")[0], title))
-    arguments.page.write_text("\n".join(parts), encoding="utf-8")
+    titles = {choice.partition("=")[0]: title for choice, title in CHOICES.items()}
+    parts += [section(rows, name, titles[name]) for name in (choice.partition("=")[0] for choice in choices)]
+    (arguments.docs / "sensitivity.md").write_text("\n".join(parts), encoding="utf-8")
 
 
 def section(rows: pd.DataFrame, name: str, title: str) -> str:

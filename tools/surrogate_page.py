@@ -1,7 +1,7 @@
 """Compare the surrogate with real NGSIM pairs: python tools/surrogate_page.py --data DIR writes docs/surrogate.md."""
 
-import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -9,6 +9,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from blocks import page_parser, table
 from scipy.stats import ks_2samp
 from sklearn.metrics import roc_auc_score
 
@@ -19,12 +20,13 @@ from merge_cosim.ngsim.pairing.pairs import Paired
 from merge_cosim.ngsim.pairing.summary import summarise
 from merge_cosim.ngsim.sites import SITES
 from merge_cosim.ngsim.surrogate.recipe import RECIPES
-from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
+from merge_cosim.ngsim.surrogate.surrogate import cached_surrogate
 
-DOCS = Path(__file__).parent.parent / "docs"
 BANDS = ((0, 40), (40, 70), (70, 110), (110, np.inf))
 """Distances to the lane change [m] by which the ambiguity of the order is told apart."""
 QUANTILES = (5, 50, 95)
+SHORT = {"seeds": (1,), "duration": 240.0, "warm_up": 60.0}
+"""What a recipe has in short mode: one recording of a few minutes, of the first site alone."""
 COLORS = {"real": "0.15", "surrogate": "#d9480f"}
 Measure = Callable[[Encounters], FloatArray]
 
@@ -86,13 +88,11 @@ def auc(e: Encounters) -> list[float]:
     """How well T_h - T_m separates the labels in each of `BANDS`."""
     t_m, t_h, left, label = approach(e)
     bands = [(low <= left) & (left < high) for low, high in BANDS]
-    return [float(roc_auc_score(label[band], (t_h - t_m)[band])) for band in bands]
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table, numbers to the right."""
-    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    both = [len(np.unique(label[band])) == 2 for band in bands]  # few pairs may have one label only
+    return [
+        float(roc_auc_score(label[band], (t_h - t_m)[band])) if told else np.nan
+        for band, told in zip(bands, both, strict=True)
+    ]
 
 
 def quantiles(values: FloatArray) -> str:
@@ -118,7 +118,7 @@ def aggregates(site: str, named: dict[str, Paired]) -> str:
             ]
         )
     head = ("", "pairs", "L_merge [m]", "speed [m/s]", "yielding", "rejected: the host changes lane, of the pairs")
-    return table(head, rows)
+    return table(head, rows).rstrip()
 
 
 def comparison(named: dict[str, Encounters]) -> str:
@@ -129,13 +129,13 @@ def comparison(named: dict[str, Encounters]) -> str:
         distance = [f"{ks_2samp(*values).statistic:.2f}"] if len(values) == 2 else []
         rows.append([title, *map(quantiles, values), *distance])
     head = ["5 / 50 / 95 %", *named, *(["KS distance"] if len(named) == 2 else [])]
-    return table(head, rows)
+    return table(head, rows).rstrip()
 
 
 def ambiguity(named: dict[str, Encounters]) -> str:
     """AUC of T_h - T_m by distance."""
     head = ["AUC", *(f"{low:g}-{high:g} m" if high < np.inf else f"over {low:g} m" for low, high in BANDS)]
-    return table(head, [[name, *(f"{value:.3f}" for value in auc(e))] for name, e in named.items()])
+    return table(head, [[name, *(f"{value:.3f}" for value in auc(e))] for name, e in named.items()]).rstrip()
 
 
 def draw(named: dict[str, Encounters], target: Path) -> None:
@@ -155,10 +155,10 @@ def draw(named: dict[str, Encounters], target: Path) -> None:
     plt.close(figure)
 
 
-def section(site: str, title: str, named: dict[str, Paired]) -> str:
-    """One site: tables and a picture."""
+def section(site: str, title: str, named: dict[str, Paired], docs: Path) -> str:
+    """One site: tables, and a picture in the folder of the page."""
     encounters = {name: paired.encounters for name, paired in named.items()}
-    draw(encounters, DOCS / "img" / f"surrogate-{site}.png")
+    draw(encounters, docs / "img" / f"surrogate-{site}.png")
     return "\n\n".join(
         [
             f"## {title}",
@@ -218,25 +218,27 @@ TAIL = """\
 """
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with real NGSIM files")
-    data = parser.parse_args().data
-    (DOCS / "img").mkdir(parents=True, exist_ok=True)
+    given = parser.parse_args(argv)
+    (given.docs / "img").mkdir(parents=True, exist_ok=True)
+    recipes = {name: replace(recipe, **(SHORT if given.short else {})) for name, recipe in RECIPES.items()}
     parts, held = [], []
-    for site in SITES:
-        made = site_pairs(surrogate_folder(site), site, source="surrogate")
-        real = site_pairs(data, site)
+    for site in SITES[:1] if given.short else SITES:
+        made = site_pairs(cached_surrogate(recipes[site.name]), site, source="surrogate")
+        real = site_pairs(given.data, site)
         assert made is not None
         if real is not None:
             held.append(f"{len(real.encounters)} pairs of {len(np.unique(real.encounters.car))} cars of {site.title}")
-        parts.append(section(site.name, site.title, ({"real": real} if real else {}) | {"surrogate": made}))
-    recipe = RECIPES["us101"]
+        parts.append(section(site.name, site.title, ({"real": real} if real else {}) | {"surrogate": made}, given.docs))
+    recipe = recipes["us101"]
     recordings = len(recipe.seeds)
     minutes = recordings * recipe.duration / 60
     head = HEAD.format(minutes=minutes, recordings=recordings, held="; ".join(held) or "nothing")
-    (DOCS / "surrogate.md").write_text("\n\n".join([head.strip(), *parts, TAIL.strip()]) + "\n", encoding="utf-8")
+    page = "\n\n".join([head.strip(), *parts, TAIL.strip()]) + "\n"
+    (given.docs / "surrogate.md").write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

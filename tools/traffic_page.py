@@ -6,39 +6,44 @@ runs one `merge-cosim sweep` of the three traffic scenarios (about a quarter of 
 summary, and its table of the traffic as a whole, into the page's block.
 """
 
-import argparse
 import json
-import subprocess
-import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
-from blocks import filled, table
+from blocks import fill_page, page_parser, table
 
+from merge_cosim.cli.main import app
 from merge_cosim.report.methods import in_order
 from merge_cosim.results.statistics.rates import wilson
 
 SCENARIOS = ("traffic-light", "traffic-dense", "traffic-stop-and-go")
 METHODS = ("acc", "slot", "slot-time", "pgm", "pgm-time", "fg-time", "ipcb", "ipcb+acc", "dbn-pf")
 BOUNDS = ("always-go", "always-yield")
-PAGE = Path(__file__).parent.parent / "docs" / "traffic.md"
+SHORT = ("encounters.replications=1", "encounters.demand.duration=100", "encounters.demand.warm_up=20")
+"""Settings of the short mode: one scene of 100 s."""
 
 
-def command(out: str) -> list[str]:
-    """The sweep."""
-    methods = [word for method in (*METHODS, *BOUNDS) for word in ("--method", method)]
-    return ["merge-cosim", "sweep", *SCENARIOS, *methods, "--out", out]
+def command(out: str, short: bool = False) -> list[str]:
+    """The sweep; in short mode two methods on one scene of each scenario."""
+    methods = [
+        word for method in (("slot", BOUNDS[0]) if short else (*METHODS, *BOUNDS)) for word in ("--method", method)
+    ]
+    settings = [word for setting in SHORT if short for word in ("--set", setting)]
+    jobs = ["--jobs", "1"] if short else []
+    return ["merge-cosim", "sweep", *SCENARIOS, *methods, *settings, *jobs, "--out", out]
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Run the sweep, if need be, and write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = page_parser(__doc__)
     parser.add_argument("--from", dest="folder", type=Path, help="result folder of the sweep, if it was run already")
-    folder = parser.parse_args().folder
+    given = parser.parse_args(argv)
+    folder = given.folder
     if folder is None:
         folder = Path(tempfile.mkdtemp(prefix="traffic-")) / "out"
-        subprocess.run([sys.executable, "-m", "merge_cosim.cli.main", *command(str(folder))[1:]], check=True)
+        app(command(str(folder), given.short)[1:], standalone_mode=False)
     summary = pd.read_json(folder / "summary.json")
     traffic = pd.read_csv(folder / "traffic.csv")
     manifest = json.loads((folder / "manifest.json").read_text())
@@ -53,7 +58,7 @@ def main() -> None:
         own = [rows[rows["scenario"] == scenario] for rows in (summary, traffic)]
         parts += [f"### {scenario}", "", by_method(*own)]
     made = "\n".join([*parts, ""])
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8"), {"tables": lambda _: made}), encoding="utf-8")
+    fill_page("traffic.md", given.docs, {"tables": lambda _: made})
 
 
 def together(summary: pd.DataFrame, traffic: pd.DataFrame) -> str:

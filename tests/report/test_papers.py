@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import results_page
 
 from merge_cosim.report.published import published
 from merge_cosim.results.store import RESULTS
@@ -83,6 +84,14 @@ def test_ours_stand_beside_theirs(evidence):
         ours = 100 * rows.loc[rows["method"] == method, "failed"].mean()
         assert table.loc[method, "designed-2_failure_pct"] == pytest.approx(ours, abs=1e-3)
         assert table.loc[method, "designed-2_published"] == published("designed-2", method).failure_pct
+
+
+def test_the_page_of_the_docs_is_filled_from_the_folder(reproduced, tmp_path):
+    results_page.main([str(reproduced), "--short", "--docs", str(tmp_path)])
+    text = (tmp_path / "results.md").read_text(encoding="utf-8")
+    table = pd.read_csv(reproduced / "tables" / "surrogate-failures.csv").set_index("method")
+    block = text.partition("<!-- table: surrogate-failures ")[2].partition("<!-- end -->")[0]
+    assert f"| acc | {table.loc['acc', 'us101-replay_failure_pct']:.2f} |" in block
 
 
 def test_finished_studies_are_not_run_again(small, reproduced):

@@ -1,0 +1,78 @@
+"""Every tool that makes a page of the docs runs in its short mode and writes a whole page, with its pictures."""
+
+import re
+from pathlib import Path
+
+import geometry_page
+import method_pages
+import models_page
+import scenes_page
+import sensitivity_page
+import surrogate_page
+import traffic_page
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def headings(page: Path) -> list[str]:
+    return re.findall(r"^#+ .*$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+
+
+def made_like(docs: Path, name: str) -> str:
+    """The page that a tool has made, which has no heading that the committed one has not, and no empty table."""
+    assert set(headings(docs / name)) <= set(headings(DOCS / name))
+    text = (docs / name).read_text(encoding="utf-8")
+    assert "| nan" not in text
+    for link in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
+        target = docs / Path(name).parent / link
+        assert target.is_file() or "full-scene" in link  # a screenshot, made by hand
+    return text
+
+
+def test_sensitivity(tmp_path):
+    sensitivity_page.main(["--short", "--docs", str(tmp_path)])
+    text = made_like(tmp_path, "sensitivity.md")
+    assert "**designed-2** (n = 48)" in text
+    assert "| **clear** |" in text
+
+
+def test_traffic(tmp_path):
+    traffic_page.main(["--short", "--docs", str(tmp_path)])
+    text = made_like(tmp_path, "traffic.md")
+    assert "6 scenes," in text
+    assert len(re.findall(r"^\| slot \|", text, flags=re.MULTILINE)) >= 4
+
+
+def test_methods(tmp_path):
+    method_pages.main(["--short", "--docs", str(tmp_path)])
+    for page in (DOCS / "methods").glob("*.md"):
+        assert made_like(tmp_path, f"methods/{page.name}") == page.read_text(encoding="utf-8")
+
+
+def test_models(tmp_path, data_dir):
+    models_page.main(["--short", "--docs", str(tmp_path), "--data", str(data_dir)])
+    text = made_like(tmp_path, "models.md")
+    table = re.search(r"## us101-ngsim\n.*?(\| accuracy.*?)\n\n", text, flags=re.DOTALL)
+    assert table is not None
+    assert table[1] in (DOCS / "models.md").read_text(encoding="utf-8")
+
+
+def test_geometry(tmp_path, data_dir):
+    geometry_page.main(["--short", "--docs", str(tmp_path), "--data", str(data_dir)])
+    text = made_like(tmp_path, "geometry.md")
+    tables = re.findall(r"^\|.*$", text, flags=re.MULTILINE)
+    assert set(tables) <= set((DOCS / "geometry.md").read_text(encoding="utf-8").splitlines())
+
+
+def test_surrogate(tmp_path, data_dir):
+    surrogate_page.main(["--short", "--docs", str(tmp_path), "--data", str(data_dir)])
+    text = made_like(tmp_path, "surrogate.md")
+    assert "4 minutes of traffic per site, in 1 recordings" in text
+    assert len(re.findall(r"^\| real \|", text, flags=re.MULTILINE)) == 2  # the pairs, and how well the order is told
+
+
+def test_scenes(tmp_path, data_dir):
+    out = tmp_path / "out"
+    scenes_page.main(["--short", "--docs", str(tmp_path), "--data", str(data_dir), "--out", str(out), "--jobs", "1"])
+    text = made_like(tmp_path, "scenes.md")
+    assert re.search(r"^\| acc \| \d+ of \d+ \|", text, flags=re.MULTILINE)
