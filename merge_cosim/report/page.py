@@ -34,6 +34,9 @@ SOURCES = {
 NO_SITES = ("designed", "random", "traffic")
 """Sources whose cases are not from a site's data."""
 
+MAPPED = ("grid", "random", "drawn")
+"""Kinds of encounters whose initial speeds fill a plane, so that there is a failure map."""
+
 
 @dataclass(frozen=True)
 class Chapter:
@@ -114,7 +117,7 @@ def _chapter(
 ) -> Chapter:
     rows = section.of(results)
     scenario = manifest["scenarios"][section.scenario]
-    is_grid = scenario["encounters"]["kind"] == "grid"
+    kind = scenario["encounters"]["kind"]
     found = {
         "outcome": tables.main_table(summary, section),
         "ambiguity": tables.strata_table(results, section),
@@ -124,13 +127,13 @@ def _chapter(
     if beliefs is not None:
         found["belief"] = beliefs
     pictures = [] if section.site == ALL_SITES else _case_pictures(section, rows, traces, drawn)
-    if is_grid:
+    if kind in MAPPED:
         caption = (
-            "Failure map: share of the cases that failed, by both initial speeds (one case for each initial offset of "
-            "the host). A dot marks speeds at which a host did not arrive in time in at least one of them."
+            "Failure map: share of the cases that failed, by both initial speeds. A dot marks speeds at which "
+            "a host did not arrive in time in at least one of them."
         )
         pictures.append(Picture.of(set_figures.failure_map(rows), caption, wide=True))
-    else:
+    if kind != "grid":
         caption = (
             "Delay of every case against |T_m − T_h| at the start; red crosses failed. Vertical lines part the "
             "strata of the table; triangles at the edges lie beyond them."

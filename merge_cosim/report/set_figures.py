@@ -19,8 +19,10 @@ SHOWN = 0.95
 """Share of the cases inside the axes, of those in which the host arrived; the rest is drawn at the edges."""
 LEAST_RANGE = 1.0
 """Smallest range of the delays [s]."""
-MOST_SPEEDS, CLASS = 40, 1.0
-"""With more different speeds than this a failure map has classes of so many m/s."""
+MOST_SPEEDS = 40
+"""With more different speeds than this a failure map has classes of speeds."""
+CLASSES, CASES_EACH = (1.0, 2.0, 5.0), 5
+"""Widths of these classes [m/s]: the smallest that leaves so many cases for each pair of them."""
 MOST_NUMBERS = 24
 """Most bars that carry their number."""
 
@@ -33,11 +35,10 @@ def failure_map(results: pd.DataFrame) -> Figure:
     Args:
         results: Rows of one scenario.
     """
-    rows = results.assign(
-        host=_classes(results["host_speed_0"]),
-        merging=_classes(results["merging_speed_0"]),
-        absent=~results["host_reached"],
-    )
+    speeds = results[["host_speed_0", "merging_speed_0"]].set_axis(["host", "merging"], axis=1)
+    if speeds.nunique().max() > MOST_SPEEDS:
+        speeds = _classes(speeds, len(results) / results["method"].nunique())
+    rows = speeds.assign(method=results["method"], failed=results["failed"], absent=~results["host_reached"])
     methods = in_order(rows["method"])
     shares = {method: _by_speeds(rows[rows["method"] == method], "failed") for method in methods}
     top = max(max(float(np.nanmax(share.to_numpy())) for share in shares.values()), 1e-3)
@@ -143,11 +144,11 @@ def _bars(ax: Any, i: int, n: int, rate: FloatArray, low: FloatArray, high: Floa
             ax.annotate(f"{height:.1f}", (place, height), (0, 1), textcoords="offset points", ha="center", fontsize=7)
 
 
-def _classes(speeds: pd.Series) -> pd.Series:
-    """The speeds themselves where they are few, as in a grid; else the middles of classes of `CLASS` m/s."""
-    if speeds.nunique() <= MOST_SPEEDS:
-        return speeds
-    return (np.floor(speeds / CLASS) + 0.5) * CLASS
+def _classes(speeds: pd.DataFrame, cases: float) -> pd.DataFrame:
+    """The middles of the classes that speeds [m/s] are in, of so many cases under each method."""
+    area = float(np.prod(np.ptp(speeds.to_numpy(dtype=float), axis=0)))
+    width = next((one for one in CLASSES if area / one**2 * CASES_EACH <= cases), CLASSES[-1])
+    return (speeds // width + 0.5) * width
 
 
 def _by_speeds(rows: pd.DataFrame, column: str) -> pd.DataFrame:

@@ -68,17 +68,18 @@ def test_failure_map_shows_the_share_of_failed_offsets(results):
     assert shown[1, 1] == pytest.approx(100 * same["failed"].mean())
 
 
-def test_failure_map_of_a_users_cases_needs_no_names(results):
-    states = np.random.default_rng(0).uniform(5.0, 25.0, (2, 500))
+@pytest.mark.parametrize(("cases", "width"), [(2_000, 1), (500, 2), (100, 5)])
+def test_failure_map_of_random_cases_has_classes_of_speeds(cases, width):
+    states = np.random.default_rng(0).uniform(5.0, 25.0, (2, cases))
     host, merging = states
     rows = pd.DataFrame({"method": "m", "host_speed_0": host, "merging_speed_0": merging, "host_reached": True})
-    figure = failure_map(rows.assign(failed=host > 20.0))
-    panel = figure.axes[0].collections[0]
-    shown = panel.get_array()
-    assert shown.shape == (20, 20)  # classes of 1 m/s
-    assert np.ma.filled(shown[:15], 0.0).max() == 0.0
-    assert shown[15:].min() == 100.0
-    assert int(np.ma.getmaskarray(shown).sum()) == 400 - len(np.unique(np.floor(states), axis=1).T)  # blank, not 0 %
+    panel = failure_map(rows.assign(failed=host > 15.0)).axes[0].collections[0]
+    shown, _, counts = panel.get_array(), *np.unique(states // width, axis=1, return_counts=True)
+    middle = np.unique((host // width + 0.5) * width)
+    assert shown.shape == (len(middle), len(middle))
+    assert np.ma.filled(shown[middle < 14.0], 0.0).max() == 0.0
+    assert shown[middle > 16.0].min() == 100.0
+    assert shown.count() == len(counts)  # where there is no case there is no share, either
 
 
 def test_other_figures_can_be_drawn(swept, results):
