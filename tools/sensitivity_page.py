@@ -20,8 +20,8 @@ from merge_cosim.cli.main import app
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.registry import parameters
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.scenarios.methods import parse_value
 from merge_cosim.scenarios.scenario import load_scenario
+from merge_cosim.scenarios.settings import parse_value
 
 METHODS = ("acc", "slot", "slot-time", "pgm", "always-go", "always-yield")
 RIVALS = ("acc", "slot", "slot-time", "pgm")

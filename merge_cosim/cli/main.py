@@ -69,7 +69,7 @@ def sweep(
 
     from merge_cosim.cli.progress import resumable, sweep_progress
     from merge_cosim.ngsim.data import find_data
-    from merge_cosim.scenarios.methods import parse_setting, parse_variation
+    from merge_cosim.scenarios.settings import parse_setting, parse_variation
     from merge_cosim.sweeps.plan import SweepRequest
     from merge_cosim.sweeps.sweep import sweep as run_sweep
 
@@ -132,7 +132,7 @@ def run(
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
     from merge_cosim.ngsim.data import find_data
-    from merge_cosim.scenarios.methods import parse_setting
+    from merge_cosim.scenarios.settings import parse_setting
     from merge_cosim.sumo.attach import Address
     from merge_cosim.sumo.outputs import SumoOutputs
     from merge_cosim.sweeps.plan import SweepRequest
@@ -179,7 +179,7 @@ def export(
     With --commonroad: run the case and write it as a CommonRoad scenario, with the host as its planning problem.
     """
     from merge_cosim.ngsim.data import find_data
-    from merge_cosim.scenarios.methods import parse_setting
+    from merge_cosim.scenarios.settings import parse_setting
     from merge_cosim.sweeps.plan import SweepRequest
     from merge_cosim.sweeps.single import export_case, export_commonroad
 

@@ -88,7 +88,7 @@ def bounds(
 ) -> None:
     """Count the cases of a replay that no host could pass without a failure, or not without a long delay."""
     from merge_cosim.ngsim.data import find_data
-    from merge_cosim.scenarios.methods import parse_setting
+    from merge_cosim.scenarios.settings import parse_setting
     from merge_cosim.studies.bounds import bounds_of
 
     cases, rows = bounds_of(scenario, dict(map(parse_setting, set_ or ())), find_data(data), source)

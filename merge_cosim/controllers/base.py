@@ -1,14 +1,28 @@
 """The role of a controller: from the decision to the host's acceleration."""
 
+from __future__ import annotations
+
 from abc import abstractmethod
+from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.registry import Component, Registry
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
+from merge_cosim.estimators.base import Estimator
 
 
 class Controller(Component):
-    """Turns what is seen and believed into accelerations of the host; parameters are dataclass fields."""
+    """Turns what is seen and believed into accelerations of the host; parameters are dataclass fields.
+
+    Attributes:
+        default_estimator: Estimator of the method that is made of a controller alone.
+    """
+
+    default_estimator: ClassVar[str] = "acc"
+
+    def taken_from(self, estimator: Estimator) -> dict[str, Any]:
+        """Parameters that are the estimator's where the two are paired, by name: they are set there alone."""
+        return {}
 
     def start(self, count: int, setting: Setting) -> None:
         """Make room for a batch of `count` encounters and forget everything before."""
@@ -29,3 +43,12 @@ class Controller(Component):
 
 
 controllers: Registry[Controller] = Registry("controller", "merge_cosim.controllers")
+
+C = TypeVar("C", bound=Controller)
+
+
+@dataclass_transform(kw_only_default=True)
+def controller(cls: type[C]) -> type[C]:
+    """Class decorator: make a class a controller that is known by its name; its annotated attributes are parameters."""
+    controllers.register(cls)
+    return cls

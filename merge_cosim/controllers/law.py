@@ -10,26 +10,40 @@ from merge_cosim.core.units import BoolArray, FloatArray
 
 
 @dataclass(kw_only=True)
-class FollowingLaw(ABC):
-    """What every law of following has: free driving, the gap that is kept, and bounds.
+class FreeDriving:
+    """Driving without a car ahead: `a = k_free (v_limit - v)`, clipped to the bounds.
 
     Attributes:
         k_free: Gain of free driving [1/s].
-        d0: Gap at standstill [m].
-        headway: Time headway T [s].
         min_acceleration: Hardest braking, negative [m/s^2].
         max_acceleration: Hardest acceleration [m/s^2], more than 0: free driving ends at the speed limit.
     """
 
     k_free: PositiveFloat = 0.4
-    d0: NonNegativeFloat = 2.0
-    headway: NonNegativeFloat = 1.5
     min_acceleration: NonPositiveFloat = -4.0
     max_acceleration: PositiveFloat = 2.0
 
     def free(self, speed: FloatArray, speed_limit: float) -> FloatArray:
-        """Acceleration [m/s^2] of a car that nobody hinders, before the bounds."""
+        """Acceleration [m/s^2] without a car ahead, before the bounds."""
         return self.k_free * (speed_limit - speed)
+
+    def clip(self, acceleration: FloatArray) -> FloatArray:
+        """Bound the acceleration to what the car can do."""
+        # np.clip does the same at twice the cost
+        return np.minimum(np.maximum(acceleration, self.min_acceleration), self.max_acceleration)
+
+
+@dataclass(kw_only=True)
+class FollowingLaw(FreeDriving, ABC):
+    """What every law of following has: free driving, and the gap that is kept.
+
+    Attributes:
+        d0: Gap at standstill [m].
+        headway: Time headway T [s].
+    """
+
+    d0: NonNegativeFloat = 2.0
+    headway: NonNegativeFloat = 1.5
 
     def gap_error(self, gap: FloatArray, speed: FloatArray) -> FloatArray:
         """How much larger than wanted the gap is, `gap - (d0 + T v)` [m]."""
@@ -45,11 +59,6 @@ class FollowingLaw(ABC):
         """Acceleration within the bounds [m/s^2]: free, and where there is a leader (`led`) no more than behind it."""
         free = self.free(speed, speed_limit)
         return self.clip(np.where(led, np.minimum(self.follow(gap, speed, leader_speed), free), free))
-
-    def clip(self, acceleration: FloatArray) -> FloatArray:
-        """Bound the acceleration to what the car can do."""
-        # np.clip does the same at twice the cost
-        return np.minimum(np.maximum(acceleration, self.min_acceleration), self.max_acceleration)
 
 
 @dataclass(kw_only=True)

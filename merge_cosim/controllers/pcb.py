@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
@@ -12,7 +12,9 @@ from merge_cosim.controllers.acc import Acc
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.encounter import Intention
 from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.registry import parameters
 from merge_cosim.core.units import TOLERANCE, BoolArray, FloatArray
+from merge_cosim.estimators.base import Estimator
 from merge_cosim.estimators.intended import IntendedAcceleration
 
 
@@ -30,7 +32,9 @@ class Pcb(IntendedAcceleration, Acc):
 
     t over the steps at which both stations are >= 0 and `gap` from bumper to bumper whoever leads, the command is
     `argmin_a sum_I P(I) C_I(a)`, P(I) from the log-odds. Once the merging car is in the lane the intention is over:
-    then acc's law drives, as for every method.
+    then acc's law drives with the gains of this controller (`pcb.headway`, not `acc.headway`).
+
+    Where the estimator has intended accelerations, as ipcb has, they are the planner's, too.
 
     Attributes:
         candidate_step: Step between the candidates [m/s^2].
@@ -51,6 +55,12 @@ class Pcb(IntendedAcceleration, Acc):
     overlap: NonNegativeFloat = 1000.0
     comfort_scale: PositiveFloat = 4.0
     gap_scale: PositiveFloat = 5.0
+
+    def taken_from(self, estimator: Estimator) -> dict[str, Any]:
+        """The intended accelerations of an estimator that has them."""
+        if not isinstance(estimator, IntendedAcceleration):
+            return {}
+        return {name: getattr(estimator, name) for name in parameters(IntendedAcceleration)}
 
     def start(self, count: int, setting: Setting) -> None:
         """Lay out the candidates."""

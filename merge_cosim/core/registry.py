@@ -5,16 +5,18 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import inspect
+import linecache
 import pkgutil
 import re
 import sys
 from abc import ABC
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from difflib import get_close_matches
+from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar, dataclass_transform
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -25,11 +27,18 @@ class Component(ABC):
     """A swappable part of a run: a dataclass whose fields are its parameters.
 
     Attributes:
-        name: The name by which the command line, scenarios and tables call it.
+        name: The name by which the command line, scenarios and tables call it; `my-estimator` for a class
+            `MyEstimator` that does not set it.
     """
 
-    __pydantic_config__: ClassVar = ConfigDict(allow_inf_nan=False)
+    __pydantic_config__: ClassVar = ConfigDict(allow_inf_nan=False, arbitrary_types_allowed=True)
     name: ClassVar[str]
+
+    def __init_subclass__(cls) -> None:
+        """Name the class after itself if it has no name of its own."""
+        super().__init_subclass__()
+        if "name" not in cls.__dict__:
+            cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "-", cls.__name__).lower()
 
 
 C = TypeVar("C", bound=Component)
@@ -47,14 +56,25 @@ class Registry(Generic[C]):
         self._classes: dict[str, type[C]] = {}
         self._searched = False
 
+    @dataclass_transform(kw_only_default=True)
     def register(self, cls: type[C]) -> type[C]:
-        """Class decorator: enter `cls` under its `name`; a name that is taken is refused."""
+        """Class decorator: enter `cls` under its `name`; see `prepare`."""
+        self._classes[cls.name] = self.prepare(cls)
+        return cls
+
+    def prepare(self, cls: type[C]) -> type[C]:
+        """Make a class a dataclass with keyword parameters, unless it is one.
+
+        Raises:
+            UserError: Its name cannot be written in a setting, or another class of the registry has it.
+        """
+        if not re.fullmatch(r"[\w-]+", cls.name):
+            raise UserError(f"{_full_name(cls)}: the name '{cls.name}' must be of letters, digits, '-' and '_'")
         known = self._classes.get(cls.name)
         if known is not None and _full_name(known) != _full_name(cls):  # else its file was imported anew
             taken = f"the {self.role} name '{cls.name}' is taken by {_full_name(known)}"
             raise UserError(f"{_full_name(cls)}: {taken}; rename yours")
-        self._classes[cls.name] = cls
-        return cls
+        return cls if "__dataclass_fields__" in cls.__dict__ else dataclass(kw_only=True)(cls)
 
     def names(self) -> list[str]:
         """All names, sorted."""
@@ -113,17 +133,37 @@ def meanings(cls: type) -> dict[str, str]:
     return {name: found.get(name, "") for name in parameters(cls)}
 
 
+def source_of(cls: type) -> str | None:
+    """The text of a class that is not of this package, or of the notebook cell it stands in; None if not to be had."""
+    if cls.__module__.partition(".")[0] == __package__.partition(".")[0]:
+        return None
+    try:
+        return inspect.getsource(cls)
+    except (OSError, TypeError):  # a class of a notebook has no file
+        codes = (getattr(value, "__code__", None) for value in vars(cls).values())
+        cells = ("".join(linecache.getlines(code.co_filename)) for code in codes if code is not None)
+        return next(filter(None, cells), None)
+
+
 def validated(cls: type[C], values: Mapping[str, Any], where: str) -> C:
     """Make the dataclass `cls`, with its fields converted and checked by their type hints."""
     for key in values:
         if key not in parameters(cls):
             raise UserError(f"{where}: no parameter '{key}'{did_you_mean(key, parameters(cls))}")
     try:
-        made: C = TypeAdapter(cls).validate_python(dict(values))
+        made: C = _adapter(cls).validate_python(dict(values))
     except ValidationError as error:
         first = error.errors()[0]
         raise UserError(f"{where}: {'.'.join(map(str, first['loc']))} = {first['input']!r}: {first['msg']}") from None
+    for key, value in values.items():
+        if isinstance(value, bool | str) and type(getattr(made, key)) in (int, float):
+            raise UserError(f"{where}: {key} = {value!r}: Input should be a number")
     return made
+
+
+@cache
+def _adapter(cls: type[C]) -> TypeAdapter[C]:
+    return TypeAdapter(cls)
 
 
 def load_plugin(file: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pyarrow as pa
 
-from merge_cosim.controllers.acc import Acc
+from merge_cosim.controllers.law import FreeDriving
 from merge_cosim.core.encounter import NEVER, Encounters, Intention
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, time_to_arrival
@@ -22,7 +22,7 @@ def result_rows(
     run: Run,
     encounters: Encounters,
     setting: Setting,
-    free_law: Acc,
+    free_law: FreeDriving,
     names: dict[str, str],
     more: Mapping[str, AnyArray | pa.Array] = {},
     world: str = SUMO,
@@ -33,7 +33,7 @@ def result_rows(
         run: The run.
         encounters: Its n cases.
         setting: Speed limit and cycle.
-        free_law: The controller whose free driving the delay is measured against.
+        free_law: The free driving that the delay is measured against.
         names: `scenario`, `variation`, `method` and `model` of all rows.
         more: Further columns, or others in their place, shape (n,) each; the columns of scenes are missing without.
         world: What moved the cars, `SUMO` or `CLOSED_FORM`.
@@ -114,7 +114,7 @@ def result_rows(
     return pa.Table.from_arrays(arrays, schema=SCHEMA)
 
 
-def free_time(station: FloatArray, speed: FloatArray, setting: Setting, law: Acc) -> FloatArray:
+def free_time(station: FloatArray, speed: FloatArray, setting: Setting, law: FreeDriving) -> FloatArray:
     """Time [s] to reach station `GOAL` by free driving in steps of dt, the crossing interpolated; 0 if past it."""
     station, speed = station.copy(), speed.copy()
     time = np.zeros(len(station))
@@ -130,7 +130,7 @@ def free_time(station: FloatArray, speed: FloatArray, setting: Setting, law: Acc
     return time
 
 
-def _delay(c: dict[str, AnyArray], encounters: Encounters, setting: Setting, law: Acc) -> FloatArray:
+def _delay(c: dict[str, AnyArray], encounters: Encounters, setting: Setting, law: FreeDriving) -> FloatArray:
     rest = free_time(c["end_station"], c["end_speed"], setting, law)
     arrival = np.where(np.isnan(c["goal_s"]), c["end_cycle"] * setting.dt + rest, c["goal_s"])
     delay: FloatArray = arrival - free_time(encounters.host_station, encounters.host_speed, setting, law)

@@ -195,7 +195,8 @@ COLUMNS = (
         "delay_s",
         NUMBER,
         "s",
-        "time to +50 m less what free driving would have taken; from the run's end on the host drives freely",
+        "time to +50 m less what free driving would have taken; from the run's end on the host drives freely. Free "
+        "driving is `k_free (v_limit - v)` within bounds, the same for all methods: the scenario's `test.free`",
     ),
     Column("hardest_braking", NUMBER, "m/s²", "the host's largest deceleration"),
     Column("mean_jerk", NUMBER, "m/s³", "mean of its absolute jerk from the second cycle on", "one cycle only"),

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from copy import deepcopy
+from dataclasses import dataclass, field
+from typing import Any, TypeVar, cast
 
-from merge_cosim.controllers.base import controllers
+from merge_cosim.controllers.base import Controller, controllers
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.registry import did_you_mean, parameters
-from merge_cosim.estimators.base import estimators
+from merge_cosim.core.registry import Component, Registry, parameters, source_of, validated
+from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.estimators.learned.model import IntentionModel
-from merge_cosim.scenarios.scenario import SECTIONS
-from merge_cosim.scenarios.sources import steps_between
 from merge_cosim.simulation.host_driver import HostDriver
 
 ORACLE_BEST = "oracle-best"
@@ -24,74 +22,162 @@ HUMAN = "human"
 CONSTANT = ("always-go", "always-yield")
 """The methods that `oracle-best` chooses from."""
 
-
-MOST_VALUES = 10_000
-"""Most values of one parameter: a slip in a step is not to fill the memory."""
+C = TypeVar("C", bound=Component)
+MethodPart = str | Component | type[Component]
+"""An estimator or a controller: its name, its class or an object of it. Neither class nor object need be registered."""
+MethodSpec = MethodPart | tuple[MethodPart, MethodPart]
+"""A method as a user names it: `pgm`, `pgm+lqr`, an estimator, a controller, or a pair of the two."""
 
 
 @dataclass(frozen=True)
 class Method:
-    """A named pair of an estimator and a controller, with the parameters that were set.
+    """A named pair of an estimator and a controller, with all their parameters.
 
     Attributes:
-        name: As the user wrote it.
+        name: As the user wrote it; of objects, the name of the estimator, or `estimator+controller`.
         estimator, controller: Names of the two.
-        settings: Parameters by `component.parameter`.
+        values: Every parameter in effect, by `component.parameter`.
+        objects: The two where their classes are not registered or they hold more than parameters; else None.
     """
 
     name: str
     estimator: str
     controller: str
-    settings: tuple[tuple[str, Any], ...] = ()
+    values: tuple[tuple[str, Any], ...] = ()
+    objects: tuple[Estimator | None, Controller | None] = field(default=(None, None), compare=False, repr=False)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.estimator, self.controller))  # a value may be a list
 
     @classmethod
-    def parse(cls, name: str, settings: Mapping[str, Any] | None = None) -> Method:
-        """Read `estimator` or `estimator+controller`.
+    def of(cls, spec: MethodSpec, settings: Mapping[str, Any] | None = None) -> Method:
+        """Make a method of what a user named.
+
+        Args:
+            spec: A name (`pgm`, `pgm+lqr`), an estimator, a controller (with its `default_estimator`), or a pair of an
+                estimator and a controller; each as a name, a class or an object.
+            settings: Parameters by `component.parameter`; those of other components are left out.
 
         Raises:
-            UserError: One of them is unknown, or a parameter is wrong.
+            UserError: A component is unknown, or a parameter is wrong or disagrees with one that it is taken from.
         """
-        if name == HUMAN:
-            return cls(HUMAN, HUMAN, "", tuple(sorted((settings or {}).items())))
-        estimator, _, controller = name.partition("+")
-        chosen = controller or estimators[estimator].default_controller
-        method = cls(name, estimator, chosen, tuple(sorted((settings or {}).items())))
-        method.driver(None)
-        return method
+        if isinstance(spec, str) and spec == HUMAN:
+            return cls(HUMAN, HUMAN, "")
+        settings = settings or {}
+        first, second, name = _parts(spec)
+        estimator, estimator_object = _make(estimators, Estimator, first, settings, name)
+        chosen = second or estimator.default_controller
+        controller, controller_object = _make(controllers, Controller, chosen, settings, name)
+        name = name or (f"{estimator.name}+{controller.name}" if second else estimator.name)
+        _take_over(name, estimator, controller, settings)
+        values = [(f"{part.name}.{key}", getattr(part, key)) for part in (estimator, controller) for key in _keys(part)]
+        if len(dict(values)) < len(values):
+            raise UserError(f"{name}: its estimator and its controller are both '{estimator.name}'; rename one of them")
+        objects = estimator_object, controller_object
+        return cls(name, estimator.name, controller.name, tuple(values), objects)
 
     @property
     def is_human(self) -> bool:
-        """It is the logged host, who needs no method."""
+        """It is the logged host, which needs no method."""
         return self.name == HUMAN
 
     @property
     def needs_model(self) -> bool:
         """Its estimator rests on a trained model."""
-        return not self.is_human and estimators[self.estimator].needs_model
+        return not self.is_human and self._estimator.needs_model
 
     @property
     def needs_label(self) -> bool:
         """Its estimator looks at the label."""
-        return not self.is_human and estimators[self.estimator].needs_label
+        return not self.is_human and self._estimator.needs_label
+
+    @property
+    def _estimator(self) -> Estimator | type[Estimator]:
+        return self.objects[0] or estimators[self.estimator]
+
+    @property
+    def _controller(self) -> Controller | type[Controller]:
+        return self.objects[1] or controllers[self.controller]
+
+    def parameters(self) -> dict[str, Any]:
+        """Every parameter in effect, by `component.parameter`."""
+        return dict(self.values)
+
+    def source(self) -> str | None:
+        """The text of those of its classes that are not of this package; None if there are none or it is not known."""
+        if self.is_human:
+            return None
+        classes = (part if isinstance(part, type) else type(part) for part in (self._estimator, self._controller))
+        return "\n\n".join(filter(None, map(source_of, classes))) or None
 
     def driver(self, model: IntentionModel | None) -> HostDriver:
-        """Make the two parts; `model` goes to an estimator that needs one."""
-        estimator = estimators.build(
-            self.estimator, self._values(self.estimator, estimators[self.estimator]), self.name
-        )
-        controller = controllers.build(
-            self.controller, self._values(self.controller, controllers[self.controller]), self.name
-        )
+        """Make the two parts anew; `model` goes to an estimator that needs one."""
+        made_estimator, made_controller = deepcopy(self.objects)
+        estimator = made_estimator or estimators.build(self.estimator, self._of(self._estimator), self.name)
+        controller = made_controller or controllers.build(self.controller, self._of(self._controller), self.name)
         if estimator.needs_model and model is not None:
             estimator.use(model)
         return HostDriver(estimator, controller)
 
-    def _values(self, component: str, cls: type) -> dict[str, Any]:
-        names = (key.partition(".") for key, _ in self.settings)
-        values = {
-            name: value for (owner, _, name), (_, value) in zip(names, self.settings, strict=True) if owner == component
-        }
-        return {name: value for name, value in values.items() if name in parameters(cls)}
+    def _of(self, part: Component | type[Component]) -> dict[str, Any]:
+        return _own(self.parameters(), part)
+
+
+def _parts(spec: MethodSpec) -> tuple[MethodPart, MethodPart | None, str]:
+    """Estimator, controller (None for the estimator's own) and the method's name, empty where it is not written."""
+    if isinstance(spec, str):
+        first, _, second = spec.partition("+")
+        return first, second or None, spec
+    if isinstance(spec, tuple) and len(spec) == 2:
+        return *spec, ""
+    part = spec if isinstance(spec, type) else type(spec)
+    if issubclass(part, Controller):
+        return part.default_estimator, spec, ""
+    return spec, None, ""
+
+
+def _make(
+    registry: Registry[C], role: type, part: MethodPart, settings: Mapping[str, Any], where: str
+) -> tuple[C, C | None]:
+    """A component with its settings; and once more, unless its name and parameters are enough to make it anew."""
+    if isinstance(part, str):
+        return registry.build(part, _own(settings, registry[part]), where), None
+    given = part if isinstance(part, type) else type(part)
+    if not issubclass(given, role):
+        raise UserError(f"{given.__name__}: a {registry.role} is due here, by name, as a class or as an object")
+    cls = registry.prepare(cast("type[C]", given))
+    try:
+        made = cls() if isinstance(part, type) else cast("C", deepcopy(part))
+    except TypeError as error:
+        raise UserError(f"{cls.__name__}: give an object instead of the class: {error}") from None
+    chosen = _own(settings, made)
+    checked = validated(cls, {key: getattr(made, key) for key in _keys(made)} | chosen, cls.__name__)
+    for key in chosen:
+        setattr(made, key, getattr(checked, key))
+    by_name = made.name in registry and registry[made.name] is cls and set(vars(made)) <= set(_keys(made))
+    return made, None if by_name else made
+
+
+def _take_over(name: str, estimator: Estimator, controller: Controller, settings: Mapping[str, Any]) -> None:
+    """Give a controller the parameters that it takes from the estimator; refuse others of its own."""
+    for key, value in controller.taken_from(estimator).items():
+        own, known = getattr(controller, key), f"{controller.name}.{key}"
+        if own != value and (known in settings or own != parameters(type(controller))[key]):
+            owner = f"{estimator.name}.{key}"
+            raise UserError(
+                f"{name}: {known} = {own!r} disagrees with {owner} = {value!r}, which it is taken from; set {owner}"
+            )
+        setattr(controller, key, value)
+
+
+def _keys(part: Component) -> list[str]:
+    return list(parameters(type(part)))
+
+
+def _own(settings: Mapping[str, Any], part: Component | type[Component]) -> dict[str, Any]:
+    """The parameters of one component, by their names."""
+    names = parameters(part if isinstance(part, type) else type(part))
+    return {name: settings[key] for name in names if (key := f"{part.name}.{name}") in settings}
 
 
 def default_methods() -> list[str]:
@@ -107,75 +193,3 @@ def methods_for(encounters: Encounters, methods: Iterable[Method]) -> list[Metho
         for method in methods
         if (labelled or not method.needs_label) and (encounters.log is not None or not method.is_human)
     ]
-
-
-def split_settings(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Part settings into those of scenarios (`test.horizon`) and those of components (`acc.headway`).
-
-    Raises:
-        UserError: A name belongs to neither.
-    """
-    of_scenario: dict[str, Any] = {}
-    of_components: dict[str, Any] = {}
-    for name, value in settings.items():
-        owner, _, parameter = name.partition(".")
-        classes = [registry[owner] for registry in (estimators, controllers) if owner in registry]
-        if any(parameter in parameters(cls) for cls in classes):
-            of_components[name] = value
-        elif owner in SECTIONS and owner != "name":
-            of_scenario[name] = value
-        elif classes:
-            known = sorted({one for cls in classes for one in parameters(cls)})
-            raise UserError(f"{name}: '{owner}' has no parameter '{parameter}'{did_you_mean(parameter, known)}")
-        else:
-            choices = [*SECTIONS, *estimators.names(), *controllers.names()]
-            raise UserError(f"{name}: nothing is called '{owner}'{did_you_mean(owner, choices)}")
-    return of_scenario, of_components
-
-
-def parse_value(text: str) -> Any:
-    """Read a value as TOML does (numbers, true, lists); what is no TOML is a string."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
-
-
-def parse_setting(text: str) -> tuple[str, Any]:
-    """Read `NAME=VALUE`.
-
-    Raises:
-        UserError: There is no `=`.
-    """
-    name, equals, value = text.partition("=")
-    if not equals or not name or not value:
-        raise UserError(f"--set {text}: write NAME=VALUE, such as acc.headway=1.2")
-    return name.strip(), parse_value(value.strip())
-
-
-def parse_variation(text: str) -> tuple[str, list[Any]]:
-    """Read `NAME=A:B:STEP` (B included where a step meets it) or `NAME=X,Y,Z`.
-
-    Raises:
-        UserError: It is neither.
-    """
-    name, equals, written = text.partition("=")
-    if not equals or not name or not written:
-        raise UserError(f"--vary {text}: write NAME=A:B:STEP or NAME=X,Y,Z")
-    name, values = name.strip(), parse_value(written.strip())
-    if not isinstance(values, str):
-        return name, [values]
-    if ":" not in values:
-        return name, [parse_value(value.strip()) for value in values.split(",")]
-    try:
-        first, last, step = (float(part) for part in values.split(":"))
-        count = steps_between(first, last, step)
-    except (ValueError, ZeroDivisionError, OverflowError):
-        count = -1
-    if not 0 <= count < MOST_VALUES:
-        raise UserError(
-            f"--vary {text}: write NAME=A:B:STEP with A <= B and fewer steps than {MOST_VALUES:,}, or X,Y,Z"
-        )
-    whole = all(part == round(part) for part in (first, step))
-    steps = [round(first + i * step, 9) for i in range(count + 1)]
-    return name, [int(value) for value in steps] if whole else steps

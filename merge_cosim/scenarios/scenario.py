@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from pydantic import (
     model_validator,
 )
 
+from merge_cosim.controllers.law import FreeDriving
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
 from merge_cosim.core.registry import did_you_mean, parameters
@@ -125,7 +127,8 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
     for name, value in (settings or {}).items():
         _set(document, name, value)
     try:
-        scenario = Scenario.model_validate({"name": file.stem, **document})
+        # as JSON in strict mode: a list is a tuple and a text is a path, but true is no number
+        scenario = Scenario.model_validate_json(json.dumps({"name": file.stem, **document}), strict=True)
     except ValidationError as error:
         raise UserError(f"{file}: {_first_problem(error)}") from None
     if not scenario.is_scene:
@@ -178,6 +181,7 @@ _KNOWN: dict[tuple[str, ...], type] = {
     ("full_scene",): FullScene,
     ("full_scene", "drivers"): ReleasedDrivers,
     ("test",): Rules,
+    ("test", "free"): FreeDriving,
 }
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
+from merge_cosim.controllers.law import FreeDriving
 from merge_cosim.core.encounter import NEVER, Encounters, ReplayLog
 from merge_cosim.core.observation import Observation
 from merge_cosim.core.units import DT, TOLERANCE, AnyArray, BoolArray, FloatArray, IntArray
@@ -33,11 +34,13 @@ class Rules:
         horizon: Time [s] scored from the first cycle on in which both cars have reached the merging point.
         time_out: Longest run [s].
         overlap_from: `both`: scored once both cars are past the merging point; `lane_change`: once the merging car is.
+        free: The free driving that delays are measured against, whatever method drives.
     """
 
     horizon: _Seconds = 3.0
     time_out: _Seconds = 40.0
     overlap_from: Literal["both", "lane_change"] = "both"
+    free: FreeDriving = field(default_factory=FreeDriving)
 
     @property
     def horizon_cycles(self) -> int:

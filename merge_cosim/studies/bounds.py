@@ -119,7 +119,7 @@ def bounds(scenario: Scenario, encounters: Encounters) -> pd.DataFrame:
         station, speed = float(encounters.host_station[row]), float(encounters.host_speed[row])
         if not by_throttle[row] and station < -TOLERANCE:
             earliest[row] = earliest_pass_behind(ahead, station, speed, GOAL, reach)
-    delay = earliest - free_time(encounters.host_station, encounters.host_speed, setting, law)
+    delay = earliest - free_time(encounters.host_station, encounters.host_speed, setting, scenario.test.free)
     return pd.DataFrame(
         {
             "scenario": scenario.name,

@@ -24,7 +24,6 @@ from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.tiles import tile_id
 from merge_cosim.sweeps.plan import default_model
 from merge_cosim.sweeps.scene_task import meeting_rows
-from merge_cosim.sweeps.task import free_law
 
 
 class HostListener(StepListener):  # type: ignore[misc]
@@ -70,7 +69,7 @@ class HostListener(StepListener):  # type: ignore[misc]
                 lanes inside junctions.
         """
         self._session, self._ramp, self._rules = Session(api), Ramp.load(ramp), rules or Rules()
-        self._method = Method.parse(method, settings)
+        self._method = Method.of(method, settings)
         if self._method.is_human or self._method.needs_label:
             raise UserError(f"{method}: it rests on a log and cannot drive in living traffic")
         self._model = IntentionModel.load(model or default_model(TRAFFIC)) if self._method.needs_model else None
@@ -107,6 +106,6 @@ class HostListener(StepListener):  # type: ignore[misc]
         names = {"scenario": "", "variation": "", "method": self._method.name}
         names["model"] = self._model.name if self._model else ""
         rows = meeting_rows(
-            self.controller.finished, "000", self._ramp, self._rules, self._setting, free_law(self._method), names
+            self.controller.finished, "000", self._ramp, self._rules, self._setting, self._rules.free, names
         )
         return rows.to_pandas()

@@ -22,17 +22,18 @@ from merge_cosim.scenarios.methods import (
     CONSTANT,
     ORACLE_BEST,
     Method,
+    MethodSpec,
     default_methods,
     methods_for,
-    split_settings,
 )
 from merge_cosim.scenarios.scenario import Scenario, load_scenario
+from merge_cosim.scenarios.settings import split_settings
 from merge_cosim.scenarios.sources import Routes, Traffic
 from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.routes import ROLE
 from merge_cosim.sweeps.full_scene_task import SceneReplay, load_scenes
 from merge_cosim.sweeps.scene_task import SceneBatch
-from merge_cosim.sweeps.task import FREE_LAW, Batch, Task
+from merge_cosim.sweeps.task import Batch, Task
 
 StartMethod = Literal["spawn", "fork"]
 
@@ -43,7 +44,7 @@ class SweepRequest:
 
     Attributes:
         scenarios: Names or files.
-        methods: Names; empty for all that there are.
+        methods: Names, components or pairs of them, see `Method.of`; empty for all that there are.
         model: Model file or name; None for the one that goes with each scenario's source.
         settings: Values of scenario keys and of component parameters.
         variations: One name and its values each, varied one at a time.
@@ -58,7 +59,7 @@ class SweepRequest:
     """
 
     scenarios: Sequence[str]
-    methods: Sequence[str] = ()
+    methods: Sequence[MethodSpec] = ()
     model: str | None = None
     settings: dict[str, Any] = field(default_factory=dict)
     variations: Sequence[tuple[str, Sequence[Any]]] = ()
@@ -93,11 +94,12 @@ def plan(request: SweepRequest) -> list[Task]:
                 continue
             labels.add(label)
             settings = request.settings | ({varied: value} if varied else {})
-            of_scenario, of_components = split_settings(settings)
+            own = [part for method in _methods(request.methods, {}) for part in method.objects if part is not None]
+            of_scenario, of_components = split_settings(settings, own)
             methods = _methods(request.methods, of_components)
-            if varied in of_components:
-                methods = [one for one in methods if varied.partition(".")[0] in (one.estimator, one.controller)]
             _refuse_unused(of_components, methods)
+            if varied in of_components:
+                methods = [method for method in methods if varied in method.parameters()]
             for scenario in _scenarios(request.scenarios, of_scenario, varied):
                 if scenario.is_scene:
                     tasks += _scene_batches(scenario, label, methods, request)
@@ -149,20 +151,26 @@ def _scenarios(names: Sequence[str], settings: dict[str, Any], varied: str) -> l
     return list(loaded.values())
 
 
-def _methods(names: Sequence[str], settings: dict[str, Any]) -> list[Method]:
-    wanted = list(dict.fromkeys(names or default_methods()))
-    if ORACLE_BEST in wanted:
-        wanted = list(dict.fromkeys([*(name for name in wanted if name != ORACLE_BEST), *CONSTANT]))
-    return [Method.parse(name, settings) for name in wanted]
+def _methods(specs: Sequence[MethodSpec], settings: dict[str, Any]) -> list[Method]:
+    wanted: list[MethodSpec] = [*(specs or default_methods())]
+    if any(isinstance(spec, str) and spec == ORACLE_BEST for spec in wanted):
+        wanted = [*(spec for spec in wanted if spec != ORACLE_BEST), *CONSTANT]
+    made: dict[str, Method] = {}
+    for spec in wanted:
+        method = Method.of(spec, settings)
+        if made.setdefault(method.name, method) != method:
+            raise UserError(f"two methods are called '{method.name}'; give the object of one another `name`")
+    return list(made.values())
 
 
 def _refuse_unused(settings: dict[str, Any], methods: Sequence[Method]) -> None:
-    """Refuse parameters of what no method consists of; those of acc are also in the law that delays are measured by."""
-    parts = {part for method in methods for part in (method.estimator, method.controller)}
+    """Refuse parameters that no method has."""
+    known = {key for method in methods for key in method.parameters()}
     for name in settings:
-        owner = name.partition(".")[0]
-        if owner not in parts and (owner != FREE_LAW or not methods):
-            raise UserError(f"{name}: no method of this sweep consists of '{owner}'; leave it out, or add --method")
+        if name not in known:
+            others = sorted(key for key in known if key.partition(".")[2] == name.partition(".")[2])
+            hint = f"set {' or '.join(others)}" if others else "leave it out"
+            raise UserError(f"{name}: no method of this sweep has this parameter; {hint}, or add --method")
 
 
 def _scene_batches(

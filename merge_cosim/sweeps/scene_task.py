@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 import pyarrow as pa
 
-from merge_cosim.controllers.acc import Acc
+from merge_cosim.controllers.law import FreeDriving
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import DT, FloatArray
 from merge_cosim.ramps.ramp import Ramp
@@ -28,7 +28,7 @@ from merge_cosim.simulation.worlds.meetings import Ending, Meeting
 from merge_cosim.simulation.worlds.traffic import Scene, SceneRun, run_scene
 from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.demand import write_traffic
-from merge_cosim.sweeps.task import Task, WorkerSession, free_law
+from merge_cosim.sweeps.task import Task, WorkerSession
 
 USUAL_LENGTH = 600.0
 """Length of a scene [s] where its configuration does not say."""
@@ -121,7 +121,7 @@ class SceneBatch(Task):
 
     def rows(self, run: SceneRun, scene: Scene) -> pa.Table:
         """One result row for each meeting in which the car merged next to the host."""
-        rules, setting, law = self.scenario.test, self.setting(scene.ramp), free_law(self.method)
+        rules, setting, law = self.scenario.test, self.setting(scene.ramp), self.scenario.test.free
         return meeting_rows(run.meetings, scene.name, scene.ramp, rules, setting, law, self.names)
 
     def facts(self, run: SceneRun, scene: Scene) -> dict[str, Any]:
@@ -136,7 +136,7 @@ def meeting_rows(
     ramp: Ramp,
     rules: Rules,
     setting: Setting,
-    law: Acc,
+    law: FreeDriving,
     names: dict[str, str],
 ) -> pa.Table:
     """Result rows of the meetings in which the car merged next to the host, one each.

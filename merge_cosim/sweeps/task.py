@@ -9,8 +9,6 @@ from typing import Self
 
 import pyarrow as pa
 
-from merge_cosim.controllers.acc import Acc
-from merge_cosim.controllers.base import controllers
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import FloatArray, IntArray
@@ -34,10 +32,6 @@ cycle's Python over more cars, but SUMO's own step costs more per car, as more c
 CHUNK_CASES = 1_000
 """Most encounters that are handed out at a time: enough to keep the tiles busy, few enough to lose little when
 interrupted."""
-
-
-FREE_LAW = "acc"
-"""The controller whose free driving delays are measured against."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +158,7 @@ class Batch(Task):
     def rows(self, run: Run, ramp: Ramp) -> pa.Table:
         """The result rows of a run."""
         world = CLOSED_FORM if self.method.is_human else SUMO
-        return result_rows(run, self.encounters, self.setting(ramp), free_law(self.method), self.names, world=world)
+        return result_rows(run, self.encounters, self.setting(ramp), self.scenario.test.free, self.names, world=world)
 
 
 class WorkerSession:
@@ -195,11 +189,3 @@ class WorkerSession:
         if self._world is not None:
             self._world.close()
             self._world = None
-
-
-def free_law(method: Method) -> Acc:
-    """The law whose free driving delays are measured against, with what was set of it."""
-    settings = {key.partition(".")[2]: value for key, value in method.settings if key.startswith(f"{FREE_LAW}.")}
-    law = controllers.build(FREE_LAW, settings, method.name)
-    assert isinstance(law, Acc)
-    return law

@@ -1,11 +1,11 @@
 import pytest
 
-from merge_cosim.controllers.acc import Acc
+from merge_cosim.controllers.law import FreeDriving
 from merge_cosim.core.errors import UserError
-from merge_cosim.scenarios.methods import Method, parse_variation
+from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import load_scenario
+from merge_cosim.scenarios.settings import parse_variation
 from merge_cosim.scenarios.sources import Span
-from merge_cosim.sweeps.task import free_law
 
 
 @pytest.mark.parametrize(
@@ -47,12 +47,13 @@ def test_what_cannot_be_varied_is_refused(text):
 )
 def test_numbers_with_which_a_host_would_never_arrive_are_refused(parameter, value):
     with pytest.raises(UserError, match=f"acc: controller acc: {parameter} = "):
-        Method.parse("acc", {f"acc.{parameter}": value})
+        Method.of("acc", {f"acc.{parameter}": value})
 
 
-def test_delays_are_measured_against_what_is_set_of_acc_whatever_drives():
-    law = free_law(Method.parse("pgm+lqr", {"acc.k_free": 0.2, "pgm.nodes": 3, "lqr.k_free": 0.3}))
-    assert law == Acc(k_free=0.2)
+def test_delays_have_a_free_driving_of_their_own():
+    assert load_scenario("designed-2", {"test.free.k_free": 0.2}).test.free == FreeDriving(k_free=0.2)
+    with pytest.raises(UserError, match=r"test\.free\.k_fre'; did you mean 'k_free'"):
+        load_scenario("designed-2", {"test.free.k_fre": 0.2})
 
 
 def test_a_horizon_without_end_is_refused():

@@ -47,7 +47,7 @@ def batches(*cars: Car, method: str = "acc", host: str = "-h1.1", **settings: An
     pairs = pairs.take(np.flatnonzero([name.endswith(host) for name in pairs.case]))
     scenes = scenes_of(build_tracks(logged, US101, PairRules(), everywhere=True), US101, PairRules())
     scenario = load_scenario("us101-scene", {f"full_scene.{name}": value for name, value in settings.items()})
-    chosen = Method.parse(method)
+    chosen = Method.of(method)
     model = IntentionModel.load("us101-ngsim") if chosen.needs_model else None
     batch = Batch(scenario=scenario, method=chosen, model=model, encounters=pairs)
     return batch, SceneReplay.of(batch, scenes)
