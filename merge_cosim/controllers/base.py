@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, ClassVar, TypeVar, dataclass_transform
+from typing import Any, ClassVar, TypeVar
 
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.registry import Component, Registry
@@ -47,7 +47,6 @@ controllers: Registry[Controller] = Registry("controller", "merge_cosim.controll
 C = TypeVar("C", bound=Controller)
 
 
-@dataclass_transform(kw_only_default=True)
 def controller(cls: type[C]) -> type[C]:
     """Class decorator: make a class a controller that is known by its name; its annotated attributes are parameters."""
     controllers.register(cls)

@@ -16,15 +16,20 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar, dataclass_transform
+from typing import Any, ClassVar, Generic, Self, TypeVar, dataclass_transform
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from merge_cosim.core.errors import UserError
 
+C = TypeVar("C", bound="Component")
 
+
+@dataclass_transform(kw_only_default=True)
 class Component(ABC):
     """A swappable part of a run: a dataclass whose fields are its parameters.
+
+    A subclass that is no dataclass becomes one, with keyword parameters, when it is registered or first made.
 
     Attributes:
         name: The name by which the command line, scenarios and tables call it; `my-estimator` for a class
@@ -40,8 +45,13 @@ class Component(ABC):
         if "name" not in cls.__dict__:
             cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "-", cls.__name__).lower()
 
+    def __new__(cls, *_: Any, **__: Any) -> Self:
+        """Make an object; its class is a dataclass from then on."""
+        return super().__new__(_as_dataclass(cls))
 
-C = TypeVar("C", bound=Component)
+
+def _as_dataclass(cls: type[C]) -> type[C]:
+    return cls if "__dataclass_fields__" in cls.__dict__ else dataclass(kw_only=True)(cls)
 
 
 class Registry(Generic[C]):
@@ -56,7 +66,6 @@ class Registry(Generic[C]):
         self._classes: dict[str, type[C]] = {}
         self._searched = False
 
-    @dataclass_transform(kw_only_default=True)
     def register(self, cls: type[C]) -> type[C]:
         """Class decorator: enter `cls` under its `name`; see `prepare`."""
         self._classes[cls.name] = self.prepare(cls)
@@ -74,7 +83,7 @@ class Registry(Generic[C]):
         if known is not None and _full_name(known) != _full_name(cls):  # else its file was imported anew
             taken = f"the {self.role} name '{cls.name}' is taken by {_full_name(known)}"
             raise UserError(f"{_full_name(cls)}: {taken}; rename yours")
-        return cls if "__dataclass_fields__" in cls.__dict__ else dataclass(kw_only=True)(cls)
+        return _as_dataclass(cls)
 
     def names(self) -> list[str]:
         """All names, sorted."""

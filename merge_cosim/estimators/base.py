@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar, TypeVar, dataclass_transform
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -56,7 +56,6 @@ estimators: Registry[Estimator] = Registry("estimator", "merge_cosim.estimators"
 E = TypeVar("E", bound=Estimator)
 
 
-@dataclass_transform(kw_only_default=True)
 def estimator(cls: type[E]) -> type[E]:
     """Class decorator: make a class an estimator that is known by its name; its annotated attributes are parameters."""
     estimators.register(cls)

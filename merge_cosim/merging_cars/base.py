@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TypeVar, dataclass_transform
+from typing import TypeVar
 
 import numpy as np
 
@@ -46,7 +46,6 @@ merging_cars: Registry[MergingCar] = Registry("merging car", "merge_cosim.mergin
 M = TypeVar("M", bound=MergingCar)
 
 
-@dataclass_transform(kw_only_default=True)
 def merging_car(cls: type[M]) -> type[M]:
     """Class decorator: make a class a merging car of its name; its annotated attributes are parameters."""
     merging_cars.register(cls)

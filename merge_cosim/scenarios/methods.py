@@ -144,7 +144,10 @@ def _make(
         return registry.build(part, _own(settings, registry[part]), where), None
     given = part if isinstance(part, type) else type(part)
     if not issubclass(given, role):
-        raise UserError(f"{given.__name__}: a {registry.role} is due here, by name, as a class or as an object")
+        article = "an" if registry.role == "estimator" else "a"
+        raise UserError(
+            f"{given.__name__}: not {article} {registry.role}; give the name, the class or an object of one"
+        )
     cls = registry.prepare(cast("type[C]", given))
     try:
         made = cls() if isinstance(part, type) else cast("C", deepcopy(part))
