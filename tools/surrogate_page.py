@@ -18,7 +18,7 @@ from merge_cosim.core.units import DT, FloatArray, time_to_arrival
 from merge_cosim.ngsim.pairing.encounters import site_pairs
 from merge_cosim.ngsim.pairing.pairs import Paired
 from merge_cosim.ngsim.pairing.summary import summarise
-from merge_cosim.ngsim.sites import SITES
+from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ngsim.surrogate.recipe import RECIPES
 from merge_cosim.ngsim.surrogate.surrogate import cached_surrogate
 
@@ -226,7 +226,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     (given.docs / "img").mkdir(parents=True, exist_ok=True)
     recipes = {name: replace(recipe, **(SHORT if given.short else {})) for name, recipe in RECIPES.items()}
     parts, held = [], []
-    for site in SITES[:1] if given.short else SITES:
+    for site in map(find_site, ("us101",) if given.short else recipes):
         made = site_pairs(cached_surrogate(recipes[site.name]), site, source="surrogate")
         real = site_pairs(given.data, site)
         assert made is not None

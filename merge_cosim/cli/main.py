@@ -205,7 +205,7 @@ def export(
 def train(
     out: Annotated[Path, typer.Option(help="Model file to write (.json).")],
     data: Data = None,
-    site: Annotated[Literal["us101", "i80"], typer.Option(help="Site to train on.")] = "us101",
+    site: Annotated[str, typer.Option(help="Site to train on: a shipped ramp, or a folder with site.toml.")] = "us101",
     source: ForceSource = None,
     split: Annotated[Literal["car", "pair"], typer.Option(help="What is kept together on one side.")] = "car",
     seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,

@@ -13,17 +13,19 @@ app = typer.Typer(help="Import, fetch, look at and imitate NGSIM trajectories.",
 MOST_NAMES = 8
 """Pairs that are named at most."""
 
-Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="NGSIM files: text, CSV or Parquet.")]
+A_SITE = "A site: the name of a shipped ramp, or the path of a folder with site.toml"
+
+Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="Trajectory files: text, CSV or Parquet.")]
 OptionalSite = Annotated[
     str | None,
-    typer.Option("--site", help="Keep only this site (us101, i80); also the site of a file that does not tell it."),
+    typer.Option("--site", help=f"{A_SITE}. Only it is kept; it is also the site of a file that does not tell it."),
 ]
 Out = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
 
 
 @app.command("import")
 def import_(files: Files, out: Out, site: OptionalSite = None, as_json: Json = False) -> None:
-    """Write NGSIM files of any format as canonical Parquet, one file per site."""
+    """Write trajectory files, NGSIM's or a site's own, as canonical Parquet, one file per site."""
     from dataclasses import asdict
 
     from rich.console import Console
@@ -78,7 +80,8 @@ def download_(
 
 @app.command("summary")
 def summary(
-    data: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with NGSIM files, or one such file.")],
+    data: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with trajectory files, or one such file.")],
+    site: Annotated[str | None, typer.Option("--site", help=f"{A_SITE}; all shipped ones if not given.")] = None,
     as_json: Json = False,
 ) -> None:
     """Show the encounters that a data folder holds, beside the papers' Table I, and what was rejected."""
@@ -88,8 +91,9 @@ def summary(
     from rich.table import Column, Table
 
     from merge_cosim.ngsim.pairing.summary import summarise_folder
+    from merge_cosim.ngsim.sites import site as find_site
 
-    summaries = summarise_folder(data)
+    summaries = summarise_folder(data, [find_site(site)] if site else ())
     if as_json:
         print_json([each.as_dict() for each in summaries])
         return
@@ -126,17 +130,17 @@ def _few(names: tuple[str, ...]) -> str:
 @app.command("surrogate")
 def surrogate(
     out: Out,
-    site: Annotated[str | None, typer.Option("--site", help="Only this site (us101, i80).")] = None,
+    site: Annotated[str | None, typer.Option("--site", help="Only the site of this shipped ramp.")] = None,
     as_json: Json = False,
 ) -> None:
     """Write synthetic trajectories, SUMO's own traffic, in NGSIM's format."""
     import pyarrow.parquet as pq
 
-    from merge_cosim.ngsim.sites import SITES
     from merge_cosim.ngsim.sites import site as find_site
+    from merge_cosim.ngsim.surrogate.recipe import RECIPES
     from merge_cosim.ngsim.surrogate.surrogate import export
 
-    files = {each.name: export(each, out) for each in ([find_site(site)] if site else SITES)}
+    files = {each.name: export(each, out) for each in map(find_site, [site] if site else RECIPES)}
     written = [
         {"site": name, "file": str(path), "rows": pq.read_metadata(path).num_rows, "source": "surrogate"}
         for name, path in files.items()

@@ -10,20 +10,6 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.ngsim.formats import Source
 
-LIMITS = {
-    "vehicle_id": (-1e8, 1e8),
-    "part": (0, 10_000),
-    "frame": (0, 1e8),
-    "x": (-50.0, 100.0),
-    "y": (-100.0, 1000.0),
-    "speed": (-1.0, 100.0),
-    "length": (0.0, 50.0),
-    "width": (0.0, 10.0),
-    "lane": (0, 20),
-}
-"""Smallest and largest possible value of each canonical column [m, m/s]: anything else is a damaged file. The lowest
-speed leaves room for the noise of a standing car."""
-
 WHOLE = ("vehicle_id", "part", "frame", "lane")
 """Canonical columns of whole numbers."""
 
@@ -91,10 +77,10 @@ def checked(cells: pa.ChunkedArray, column: str, name: str, place: Place) -> Flo
         UserError: A cell is not a number or impossible.
     """
     values = numbers(cells, column, place, optional=name in OPTIONAL)
-    unit = 1.0 if name in WHOLE else place.source.layout.unit
+    unit = 1.0 if name in (*WHOLE, "time") else place.source.layout.unit
     if name in WHOLE:
         _refuse(values != np.floor(values), cells, column, place, "not a whole number")
-    low, high = (limit / unit for limit in LIMITS[name])
+    low, high = (limit / unit for limit in place.source.layout.limits[name])
     _refuse((values < low) | (values > high), cells, column, place, f"impossible: outside {low:g} to {high:g}")
     return np.where(values > 0, values, np.nan) * unit if name in OPTIONAL else values * unit
 

@@ -16,9 +16,9 @@ import pyarrow.parquet as pq
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import cache_folder
 from merge_cosim.ngsim.download import UNFINISHED
-from merge_cosim.ngsim.formats import Kind, sources
+from merge_cosim.ngsim.formats import NGSIM, Kind, Layout, sources
 from merge_cosim.ngsim.read import Reading, merge, read_file
-from merge_cosim.ngsim.sites import Site, site
+from merge_cosim.ngsim.sites import Site, shipped_sites, site
 from merge_cosim.ngsim.table import Repeats
 
 READER_VERSION = 1
@@ -61,16 +61,21 @@ def find_data(option: Path | None) -> Path | None:
     return usual if usual.is_dir() and any(usual.iterdir()) else None
 
 
-def data_files(data: Path) -> list[DataFile]:
+def data_files(data: Path, layout: Layout = NGSIM) -> list[DataFile]:
     """Look into every file of a data folder (or at the one file named), sorted by path.
+
+    Args:
+        data: The folder or file.
+        layout: How trajectory files may be laid out, if they are not canonical.
 
     Raises:
         UserError: A file is damaged.
     """
     if data.is_file():
-        return [_look(data)]
+        return [_look(data, layout)]
     paths = (path for path in data.rglob("*") if path.is_file())
-    return [_look(path) for path in sorted(paths) if not any(p.startswith(".") for p in path.relative_to(data).parts)]
+    shown = (path for path in sorted(paths) if not any(p.startswith(".") for p in path.relative_to(data).parts))
+    return [_look(path, layout) for path in shown]
 
 
 def episode_files(data: Path) -> list[Path]:
@@ -94,12 +99,12 @@ def load_trajectories(data: Path | Iterable[Path], wanted: str | Site) -> pa.Tab
     """
     wanted = site(wanted) if isinstance(wanted, str) else wanted
     if isinstance(data, Path) and data.is_dir():
-        paths = [file.path for file in data_files(data) if file.kind is Kind.TRAJECTORIES]
-        readings = [cached(path) for path in paths]
+        paths = [file.path for file in data_files(data, wanted.layout) if file.kind is Kind.TRAJECTORIES]
+        readings = [cached(path, wanted) for path in paths]
     else:
         named = [data] if isinstance(data, Path) else list(data)
-        paths = [path for path in named if _look(path).kind is not Kind.EPISODES]
-        readings = [cached(path) for path in paths]
+        paths = [path for path in named if _look(path, wanted.layout).kind is not Kind.EPISODES]
+        readings = [cached(path, wanted) for path in paths]
         for path, reading in zip(paths, readings, strict=True):
             if wanted.name not in reading.tables:
                 raise UserError(f"{path}: no row of {wanted.name} (it has {reading.holds})")
@@ -109,16 +114,24 @@ def load_trajectories(data: Path | Iterable[Path], wanted: str | Site) -> pa.Tab
     return held[0].tables[wanted.name] if len(held) == 1 else merge(held).tables[wanted.name]
 
 
-def cached(path: Path) -> Reading:
-    """Read a trajectory file, or take its tables from the cache if it was read before and has not changed."""
+def cached(path: Path, wanted: Site | None = None) -> Reading:
+    """Read a trajectory file, or take its tables from the cache if it was read before and has not changed.
+
+    Args:
+        path: The file.
+        wanted: The site that is looked for; a shipped one of NGSIM's format is told by the file itself.
+    """
+    if wanted and wanted.recording.format == "ngsim" and wanted in shipped_sites():
+        wanted = None
     try:
         state = path.resolve().stat()
     except OSError:
-        return read_file(path)
+        return read_file(path, wanted)
     key = f"{path.resolve()}|{state.st_size}|{state.st_mtime_ns}|{READER_VERSION}"
+    key += f"|{wanted!r}" if wanted else ""
     folder = cache_folder("ngsim") / hashlib.sha256(key.encode()).hexdigest()[:16]
     if not (folder / "reading.json").is_file():
-        reading = read_file(path)
+        reading = read_file(path, wanted)
         _store(reading, folder)
         return reading
     facts = json.loads((folder / "reading.json").read_text())
@@ -144,10 +157,10 @@ def _store(reading: Reading, folder: Path) -> None:
         shutil.rmtree(made)  # another process was faster
 
 
-def _look(path: Path) -> DataFile:
+def _look(path: Path, layout: Layout) -> DataFile:
     if path.suffix == UNFINISHED:
         return DataFile(path, Kind.OTHER, "an unfinished download")
-    found = sources(path)
+    found = sources(path, layout)
     kinds = [source.kind for source in found]
     if Kind.TRAJECTORIES in kinds:
         return DataFile(path, Kind.TRAJECTORIES)

@@ -1,4 +1,4 @@
-"""Telling NGSIM files apart by their content: what a file holds, which columns, and how to open it."""
+"""Telling trajectory files apart by their content: what a file holds, which columns, and how to open it."""
 
 import csv
 import gzip
@@ -57,23 +57,63 @@ class Kind(StrEnum):
     OTHER = "other"
 
 
+LIMITS = {
+    "vehicle_id": (-1e8, 1e8),
+    "part": (0, 10_000),
+    "frame": (0, 1e8),
+    "time": (0, 1e8),
+    "x": (-50.0, 100.0),
+    "y": (-100.0, 1000.0),
+    "speed": (-1.0, 100.0),
+    "length": (0.0, 50.0),
+    "width": (0.0, 10.0),
+    "lane": (0, 20),
+}
+"""Smallest and largest possible value of each canonical column in NGSIM's files [m, m/s]: anything else is a damaged
+file. The lowest speed leaves room for the noise of a standing car."""
+
+WIDE = LIMITS | {"x": (-1e6, 1e6), "y": (-1e6, 1e6), "lane": (-32_768, 32_767)}
+"""The same for recordings of any site, which choose their own zero and lane numbers."""
+
+COLUMNS = (*LIMITS, "recording")
+"""What a recording's columns can be: the canonical ones, and `time` [s] in place of `frame`."""
+
+
 @dataclass(frozen=True)
 class Layout:
-    """How a format names the canonical columns, and its unit of length.
+    """How a format names the canonical columns, and what else is known of it.
 
     Attributes:
         numbers: The format's name of each canonical column of numbers; matched without regard to case.
         recording: Its name of the column that names the recording, if it has one.
         unit: Metres per unit of length.
+        limits: Possible values of each canonical column [m, m/s].
+        optional: Canonical columns that a file may lack.
+        of_site: It is one site's own: all rows are of that site, and a file without a `recording` is one recording.
+        rate: Frames per second.
+        skip_first: Rows left out at the start of each track.
+        to_front: Car lengths from the logged point of a car to its front bumper.
+        default_length: Length of a car whose length was not logged, for `to_front` [m].
+        smoothed: Positions were smoothed before they were published (where no column tells).
     """
 
     numbers: dict[str, str]
     recording: str
     unit: float
+    limits: dict[str, tuple[float, float]]
+    optional: tuple[str, ...] = ("part", "length", "width")
+    of_site: bool = False
+    rate: float = 10.0
+    skip_first: int = 0
+    to_front: float = 0.0
+    default_length: float = 5.0
+    smoothed: bool = False
 
+    @property
+    def required(self) -> list[str]:
+        """Names of the columns of numbers that every file has."""
+        return [column for name, column in self.numbers.items() if name not in self.optional]
 
-REQUIRED = ("vehicle_id", "frame", "x", "y", "speed", "lane")
-"""Canonical columns that every trajectory file has, beside what tells the site and the recording."""
 
 NGSIM = Layout(
     {
@@ -89,10 +129,11 @@ NGSIM = Layout(
     },
     recording="segment",
     unit=FOOT,
+    limits=LIMITS,
 )
 """The published files and what keeps their names."""
 
-OWN = Layout({name: name for name in NGSIM.numbers}, recording="recording", unit=1.0)
+OWN = Layout({name: name for name in NGSIM.numbers}, recording="recording", unit=1.0, limits=WIDE)
 """The canonical table."""
 
 
@@ -130,8 +171,12 @@ class Source:
         return next((column for column in self.columns if column.lower() == name.lower()), None)
 
 
-def sources(path: Path) -> list[Source]:
+def sources(path: Path, layout: Layout = NGSIM) -> list[Source]:
     """Look into a file: one source, or one for each member of a zip archive.
+
+    Args:
+        path: The file.
+        layout: How the file may be laid out, if it is not canonical.
 
     Raises:
         UserError: The file is missing, cannot be read or is damaged.
@@ -141,18 +186,18 @@ def sources(path: Path) -> list[Source]:
             magic = file.read(4)
         if magic == _PARQUET:
             columns = tuple(pq.read_schema(path).names)
-            return [_told(Source(path, Kind.OTHER, columns=columns, parquet=True))]
+            return [_told(Source(path, Kind.OTHER, columns=columns, parquet=True), layout)]
         if magic == _ZIP:
             with zipfile.ZipFile(path) as archive:
                 members = [info.filename for info in archive.infolist() if not info.is_dir()]
-            return [_text(path, member) for member in members]
+            return [_text(path, layout, member) for member in members]
     except FileNotFoundError:
         raise UserError(f"{path}: no such file") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (pa.ArrowInvalid, zipfile.BadZipFile):
         raise UserError(f"{path}: damaged or cut short: download or copy it again") from None
-    return [_text(path)]
+    return [_text(path, layout)]
 
 
 @contextmanager
@@ -177,10 +222,10 @@ def open_text(path: Path, member: str = "") -> Iterator[BinaryIO]:
 
 def missing_columns(source: Source, layout: Layout) -> list[str]:
     """Return the layout's names of the required columns that a source lacks."""
-    return [layout.numbers[name] for name in REQUIRED if not source.find(layout.numbers[name])]
+    return [column for column in layout.required if not source.find(column)]
 
 
-def _text(path: Path, member: str = "") -> Source:
+def _text(path: Path, layout: Layout, member: str = "") -> Source:
     """Tell a text by its first line."""
     with open_text(path, member) as file:
         line = file.readline(_MAX_HEADER)
@@ -193,28 +238,25 @@ def _text(path: Path, member: str = "") -> Source:
     blanks = "," not in text
     fields = text.split() if blanks else [field.strip() for field in next(csv.reader([text]))]
     if not all(_is_number(field) for field in fields):
-        return _told(replace(source, columns=tuple(fields), blanks=blanks))
+        return _told(replace(source, columns=tuple(fields), blanks=blanks), layout)
     if len(fields) == len(TEXT_COLUMNS):
         return replace(source, kind=Kind.TRAJECTORIES, columns=TEXT_COLUMNS, header=False, blanks=blanks)
     return replace(source, note=f"it has {len(fields)} columns and no header, NGSIM's text has {len(TEXT_COLUMNS)}")
 
 
-def _told(source: Source) -> Source:
+def _told(source: Source, expected: Layout) -> Source:
     """Tell a file by its columns."""
     if _EPISODES.issubset(source.columns):
         return replace(source, kind=Kind.EPISODES)
     if source.find("t_rel") and not source.find("Frame_ID"):
         return replace(source, kind=Kind.NO_CLOCK, note="its cars stand on no common clock (t_rel), they make no pairs")
-    missing, layout = min(((missing_columns(source, layout), layout) for layout in (NGSIM, OWN)), key=_number_missing)
+    lacks = [(missing_columns(source, layout), layout) for layout in (expected, OWN)]
+    missing, layout = min(lacks, key=lambda one: len(one[0]))
     if len(missing) <= MAX_MISSING:
         return replace(source, kind=Kind.TRAJECTORIES, layout=layout)
-    if len(missing) == len(REQUIRED):
-        return replace(source, note="it has none of the columns of NGSIM")
+    if len(missing) == len(layout.required):
+        return replace(source, note=f"it has none of the columns of {'the site' if layout.of_site else 'NGSIM'}")
     return replace(source, note=f"it lacks the columns {', '.join(missing)}")
-
-
-def _number_missing(choice: tuple[list[str], Layout]) -> int:
-    return len(choice[0])
 
 
 def _is_number(field: str) -> bool:

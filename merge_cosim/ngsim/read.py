@@ -9,7 +9,8 @@ import pyarrow as pa
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.blocks import map_blocks
-from merge_cosim.ngsim.formats import Kind, Source, sources
+from merge_cosim.ngsim.formats import NGSIM, Kind, Source, sources
+from merge_cosim.ngsim.resample import at_10_hz, without_first
 from merge_cosim.ngsim.rows import Piece, convert, needed_columns
 from merge_cosim.ngsim.sites import Site
 from merge_cosim.ngsim.table import SCHEMA, ClockError, Repeats, canonical, name_recordings
@@ -42,12 +43,12 @@ def read_file(path: Path, assumed: Site | None = None) -> Reading:
 
     Args:
         path: Text, CSV or Parquet; text also packed with gzip or in a zip archive.
-        assumed: The site of a file that does not tell it.
+        assumed: The site of a file that does not tell it, or whose own layout the file has.
 
     Raises:
         UserError: The file holds no trajectories, lacks a column, is damaged or holds an impossible value.
     """
-    found = sources(path)
+    found = sources(path, assumed.layout if assumed else NGSIM)
     usable = [source for source in found if source.kind is Kind.TRAJECTORIES]
     if not usable:
         raise UserError(f"{path}: not trajectory data: {found[0].note or found[0].kind}" if found else f"{path}: empty")
@@ -92,6 +93,8 @@ def _read(source: Source, assumed: Site | None) -> Reading:
                 f"{source}: Global_Time does not advance by 100 ms per Frame_ID: take the file as it was published "
                 "(a spreadsheet rounds such numbers)"
             ) from None
+        whole = without_first(tables[name], source.layout.skip_first)
+        tables[name] = at_10_hz(whole, source.layout.rate)
         repeats += repeated
     return Reading(tables, rows, elsewhere, repeats)
 

@@ -10,8 +10,8 @@ import pyarrow.compute as pc
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.ngsim.clean import OPTIONAL, Place, checked, numbers
-from merge_cosim.ngsim.formats import Source, missing_columns
-from merge_cosim.ngsim.sites import SITES, Site
+from merge_cosim.ngsim.formats import OWN, Source, missing_columns
+from merge_cosim.ngsim.sites import Site, shipped_sites
 from merge_cosim.ngsim.table import SCHEMA
 
 CLOCK = "Global_Time"
@@ -35,75 +35,95 @@ class Piece:
 
 def needed_columns(source: Source, assumed: Site | None) -> list[str]:
     """Return the columns to read, as the file spells them."""
-    missing = missing_columns(source, source.layout)
-    clock = [] if source.find(source.layout.recording) else [CLOCK]
+    layout = source.layout
+    missing = missing_columns(source, layout)
+    clock = [] if layout.of_site or source.find(layout.recording) else [CLOCK]
     missing += [name for name in clock if not source.find(name)]
+    if layout.of_site and layout.recording and not source.find(layout.recording):
+        missing.append(layout.recording)
     if missing:
         raise UserError(
             f"{source}: no column {' and no column '.join(missing)}; the columns are {', '.join(source.columns)}"
         )
-    site = [name for name in ("Location", "site") if source.find(name)][:1] or ["Global_X", "Global_Y"]
-    if not all(map(source.find, site)):
-        if not assumed:
-            raise UserError(
-                f"{source}: no column Location, nor Global_X and Global_Y, tells its site: "
-                "name it with 'merge-cosim ngsim import --site'"
-            )
-        site = []
-    wanted = [*site, *clock, source.layout.recording, *source.layout.numbers.values(), "source", "smoothed"]
-    return [column for name in wanted if (column := source.find(name))]
+    wanted = [*_site_columns(source, assumed), *clock, layout.recording, *layout.numbers.values(), "source", "smoothed"]
+    return list(dict.fromkeys(column for name in wanted if (column := source.find(name))))
 
 
 def convert(raw: pa.Table, first: int, source: Source, assumed: Site | None) -> Piece:
     """Turn one block of a file into canonical rows of each site; `first` is the number of its first row."""
     every = Place(source, first + np.arange(raw.num_rows))
-    codes, elsewhere = _site_codes(raw, every, assumed)
+    sites, codes, elsewhere = _sites(raw, every, assumed)
     tables = {}
-    for code, site in enumerate(SITES):
+    for code, site in enumerate(sites):
         rows = np.flatnonzero(codes == code)
         if len(rows):
             part = raw if len(rows) == raw.num_rows else raw.filter(pa.array(codes == code))
-            tables[site.name] = _rows(part, site, Place(source, every.rows[rows]))
+            tables[site] = _rows(part, site, Place(source, every.rows[rows]))
     return Piece(tables, raw.num_rows, elsewhere)
 
 
-def _site_codes(raw: pa.Table, place: Place, assumed: Site | None) -> tuple[IntArray, Counter[str]]:
-    """Tell the site of each row (its place in `SITES`, -1 for none) and count the rows of other sites."""
-    source = place.source
-    column = source.find("Location") or source.find("site")
-    if column:
-        names = _texts(raw, column)
-        known = {key: code for code, site in enumerate(SITES) for key in (site.name, site.location)}
-        sites = [name.strip().lower() for name in names.dictionary.to_pylist()]
-        code_of = np.array([known.get(name, -1) for name in sites], dtype=np.int64)
-        row_site = names.indices.to_numpy()
-        counts = np.bincount(row_site, minlength=len(sites))
-        elsewhere = {name or "no site": int(counts[i]) for i, name in enumerate(sites) if name not in known}
-        return code_of[row_site], Counter(elsewhere)
-    x, y = source.find("Global_X"), source.find("Global_Y")
-    if x is None or y is None:
+def _site_columns(source: Source, assumed: Site | None) -> list[str]:
+    """The columns that tell the rows' sites; none where the layout is one site's own."""
+    if source.layout.of_site:
+        return []
+    told = [name for name in ("Location", "site") if source.find(name)][:1] or ["Global_X", "Global_Y"]
+    if all(map(source.find, told)):
+        return told
+    if not assumed:
+        raise UserError(
+            f"{source}: no column Location, nor Global_X and Global_Y, tells its site: "
+            "name it with 'merge-cosim ngsim import --site'"
+        )
+    return []
+
+
+def _sites(raw: pa.Table, place: Place, assumed: Site | None) -> tuple[list[str], IntArray, Counter[str]]:
+    """Name the sites of a block, tell each row's place among them (-1: none), and count the rows of other sites.
+
+    In the canonical layout every site counts; in NGSIM's, the shipped ones and the one that is assumed.
+    """
+    source, told = place.source, _site_columns(place.source, assumed)
+    if not told:
         assert assumed is not None
-        return np.full(raw.num_rows, SITES.index(assumed)), Counter()
+        return [assumed.name], np.zeros(raw.num_rows, dtype=np.int64), Counter()
+    wanted = [*shipped_sites(), *([assumed] if assumed else [])]
+    if len(told) == 1:
+        known = {key.lower(): site.name for site in wanted for key in (site.name, site.recording.location) if key}
+        names = _texts(raw, source.find(told[0]) or "")
+        written = [name.strip() for name in names.dictionary.to_pylist()]
+        meant = [known.get(name.lower(), name if source.layout is OWN else "") for name in written]
+        found = sorted({name for name in meant if name})
+        row_name = names.indices.to_numpy()
+        counts = np.bincount(row_name, minlength=len(written))
+        elsewhere = {name.lower() or "no site": int(counts[i]) for i, name in enumerate(written) if not meant[i]}
+        codes = np.array([found.index(name) if name else -1 for name in meant], dtype=np.int64)
+        return found, codes[row_name], Counter(elsewhere)
     codes = np.full(raw.num_rows, -1)
-    east, north = numbers(raw[x], x, place), numbers(raw[y], y, place)
-    for code, site in enumerate(SITES):
-        (west, right), (south, top) = site.global_x, site.global_y
-        codes[(west <= east) & (east <= right) & (south <= north) & (north <= top)] = code
+    east, north = (numbers(raw[column], column, place) for name in told if (column := source.find(name)))
+    for code, site in enumerate(wanted):
+        if site.recording.global_x and site.recording.global_y:
+            (west, right), (south, top) = site.recording.global_x, site.recording.global_y
+            codes[(west <= east) & (east <= right) & (south <= north) & (north <= top)] = code
     outside = int((codes < 0).sum())
-    return codes, Counter({"outside both study areas": outside} if outside else {})
+    return [site.name for site in wanted], codes, Counter({"outside all study areas": outside} if outside else {})
 
 
-def _rows(raw: pa.Table, site: Site, place: Place) -> pa.Table:
+def _rows(raw: pa.Table, site: str, place: Place) -> pa.Table:
     """Return one site's rows in the canonical columns, checked."""
-    source = place.source
-    values = {"part": np.ones(raw.num_rows)} | {name: np.full(raw.num_rows, np.nan) for name in OPTIONAL}
-    for name, spelled in source.layout.numbers.items():
+    source, layout = place.source, place.source.layout
+    values = {"part": np.ones(raw.num_rows)} | {name: np.full(raw.num_rows, np.nan) for name in ("x", *OPTIONAL)}
+    for name, spelled in layout.numbers.items():
         if column := source.find(spelled):
             values[name] = checked(raw[column], column, name, place)
+    if "time" in values:
+        values["frame"] = np.rint(values.pop("time") * layout.rate)
+    if layout.to_front:
+        length = values["length"]
+        values["y"] = values["y"] + layout.to_front * np.where(np.isnan(length), layout.default_length, length)
     columns = {
         name: pa.array(array.astype(SCHEMA.field(name).type.to_pandas_dtype())) for name, array in values.items()
     }
-    columns["site"] = pa.DictionaryArray.from_arrays(np.zeros(raw.num_rows, dtype=np.int32), [site.name])
+    columns["site"] = pa.DictionaryArray.from_arrays(np.zeros(raw.num_rows, dtype=np.int32), [site])
     columns["smoothed"] = _smoothed(raw, source)
     columns["recording"] = _recording(raw, values["frame"], place)
     return pa.table({name: columns[name] for name in SCHEMA.names})
@@ -117,6 +137,8 @@ def _recording(raw: pa.Table, frame: FloatArray, place: Place) -> pa.Array:
         if empty.any():
             raise place.error(int(np.argmax(empty)), f"{column} is empty")
         return names
+    if place.source.layout.of_site:
+        return pa.array([place.source.path.stem] * raw.num_rows).dictionary_encode()
     column = place.source.find(CLOCK)
     assert column is not None
     return pa.array((numbers(raw[column], column, place) - FRAME_MS * frame).astype(np.int64))
@@ -129,6 +151,8 @@ def _texts(raw: pa.Table, column: str) -> pa.DictionaryArray:
 
 def _smoothed(raw: pa.Table, source: Source) -> pa.Array:
     """Tell which rows come from smoothed positions."""
+    if source.layout.of_site:
+        return pa.array(np.full(raw.num_rows, source.layout.smoothed))
     if column := source.find("smoothed"):
         return raw[column].cast(pa.bool_()).combine_chunks()
     if column := source.find("source"):

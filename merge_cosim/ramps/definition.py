@@ -1,24 +1,15 @@
 """The file `ramp.toml`: what a net's edges mean for an encounter, and where each fact comes from."""
 
-import tomllib
-from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 
-from merge_cosim.core.errors import UserError
+from merge_cosim.core.toml_file import Table, read_toml
 
 FILE_NAME = "ramp.toml"
 
 
-class _Table(BaseModel):
-    """A table of the file: a misspelt key is refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Extensions(_Table):
+class Extensions(Table):
     """Straight road added beyond the surveyed one, in m past the gore; a missing key means none.
 
     Attributes:
@@ -34,7 +25,7 @@ class Extensions(_Table):
     exit_after: float | None = None
 
 
-class NgsimMapping(_Table):
+class NgsimMapping(Table):
     """How NGSIM's lanes and Local_Y lie on the net.
 
     Attributes:
@@ -46,7 +37,7 @@ class NgsimMapping(_Table):
     lanes: dict[int, list[str]]
 
 
-class RampFile(_Table):
+class RampFile(Table):
     """Contents of `ramp.toml`.
 
     Attributes:
@@ -77,10 +68,10 @@ class RampFile(_Table):
     gore: str
     merging_point: float = Field(ge=0.0)
     speed_limit: PositiveFloat
-    lengths: dict[str, PositiveFloat] = {}
+    lengths: dict[str, PositiveFloat] = Field(default_factory=dict)
     extensions: Extensions = Extensions()
     ngsim: NgsimMapping | None = None
-    sources: dict[str, str] = {}
+    sources: dict[str, str] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _one_story(self) -> "RampFile":
@@ -108,24 +99,4 @@ def read_ramp_file(folder: Path) -> RampFile:
     Raises:
         UserError: The file is missing, is not TOML, or a key in it is wrong; the line names file and key.
     """
-    path = folder / FILE_NAME
-    try:
-        content: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); a ramp is a folder with {FILE_NAME}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: not valid TOML: {error}") from None
-    try:
-        return RampFile.model_validate(content)
-    except ValidationError as error:
-        found = error.errors()
-        first = next((each for each in found if each["type"] == "extra_forbidden"), found[0])
-        key = ".".join(map(str, first["loc"]))
-        reason = first["msg"].removeprefix("Value error, ")
-        if first["type"] == "extra_forbidden":
-            known = [name for table in (RampFile, Extensions, NgsimMapping) for name in table.model_fields]
-            near = get_close_matches(str(first["loc"][-1]), known, n=1)
-            reason = f"unknown key; did you mean '{near[0]}'?" if near else "unknown key"
-        elif first["type"] == "missing":
-            reason = "missing; every ramp needs it"
-        raise UserError(f"{path}: {key + ': ' if key else ''}{reason}") from None
+    return read_toml(folder / FILE_NAME, RampFile, "ramp")

@@ -25,6 +25,7 @@ from merge_cosim.results.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, ResultF
 REPORT = "report.html"
 SOURCES = {
     "ngsim": "real NGSIM data",
+    "recorded": "real recorded data",
     "surrogate": "SYNTHETIC surrogate data, made by SUMO, not real",
     "designed": "designed initial states, no data",
     "random": "random initial states, no data",

@@ -15,7 +15,7 @@ from merge_cosim.core.units import FloatArray
 from merge_cosim.ngsim.data import data_files, episode_files, load_trajectories
 from merge_cosim.ngsim.pairing.encounters import at_site_point, site_encounters
 from merge_cosim.ngsim.pairing.split import split_cars
-from merge_cosim.ngsim.sites import SITES, site
+from merge_cosim.ngsim.sites import Site, shipped_sites, site
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.scenarios.hidden import hidden_encounters
@@ -75,28 +75,29 @@ def pairs_of_site(name: str, pairs: Pairs, data: Path | None, source: SourceChoi
     Raises:
         UserError: Real data are asked for and absent, or the data folder holds nothing of any site, or a damaged file.
     """
-    real = None if source == "surrogate" or data is None else site_encounters(data, site(name), pairs.rules)
+    there = site(name)
+    real = None if source == "surrogate" or data is None else site_encounters(data, there, pairs.rules)
     if real is not None and not len(real):
         real = None
     if real is None and source == "ngsim":
         where = data or "no data folder (give --data DIR or set MERGE_COSIM_DATA)"
-        raise UserError(f"{where}: no {name} pairs in real NGSIM data; leave out --source ngsim to use the surrogate")
+        raise UserError(f"{where}: no {there.name} pairs in real data; leave out --source ngsim to use the surrogate")
     if real is None and source is None and data is not None:
-        _refuse_nothing(data)
+        _refuse_nothing(data, there)
     if real is None:
-        folder = surrogate_folder(site(name))
-        real = site_encounters(folder, site(name), pairs.rules, source="surrogate")
+        real = site_encounters(surrogate_folder(there), there, pairs.rules, source="surrogate")
         assert real is not None
     return real
 
 
-def _refuse_nothing(data: Path) -> None:
-    """Refuse a folder that can stand for no site at all: who names one does not expect the surrogate."""
-    if any(load_trajectories(data, one) is not None for one in SITES) or episode_files(data):
+def _refuse_nothing(data: Path, wanted: Site) -> None:
+    """Refuse a folder that can stand for no site at all: a user who names one does not expect the surrogate."""
+    sites = list({one.name: one for one in (*shipped_sites(), wanted)}.values())
+    if any(load_trajectories(data, one) is not None for one in sites) or episode_files(data):
         return
     notes = "; ".join(f"{file.path.name}: {file.note}" for file in data_files(data) if file.note)
     raise UserError(
-        f"{data}: no row of {' or '.join(one.name for one in SITES)} in any NGSIM file there"
+        f"{data}: no row of {' or '.join(one.name for one in sites)} in any file there"
         f"{f' ({notes})' if notes else ''}; leave it out, or add --source surrogate, to use the surrogate"
     )
 

@@ -131,6 +131,8 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
         scenario = Scenario.model_validate_json(json.dumps({"name": file.stem, **document}), strict=True)
     except ValidationError as error:
         raise UserError(f"{file}: {_first_problem(error)}") from None
+    except UserError as error:
+        raise UserError(f"{file}: {error}") from None
     if not scenario.is_scene:
         try:
             scenario.merging_car()

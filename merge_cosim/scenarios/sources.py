@@ -119,20 +119,21 @@ class Random(Strict):
 
 
 class Pairs(Strict):
-    """Logged pairs of NGSIM, or of the surrogate.
+    """Logged pairs, or those of the surrogate.
 
     Attributes:
-        sites: Which part of which site: `train`, `test` or `all`.
+        sites: Which part of which site: `train`, `test` or `all`. A site is the name of a shipped ramp, or the path of
+            a ramp's folder with a `site.toml`.
         split: `car`: all pairs of a merging car are on one side; `pair`: as the papers split.
         fraction: Share to train on.
         seed: Seed of the split.
         merge_point: `car`: station 0 is each logged lane change; `site`: the site's median, which tells an estimator
             nothing about the future.
-        rules: How cars become pairs.
+        rules: How cars become pairs; what is not set is as the site has it.
     """
 
     kind: Literal["pairs"]
-    sites: dict[Literal["us101", "i80"], Literal["train", "test", "all"]]
+    sites: dict[str, Literal["train", "test", "all"]]
     split: Literal["car", "pair"] = "car"
     fraction: Annotated[float, Field(gt=0, lt=1)] = 1 / 3
     seed: int = 0

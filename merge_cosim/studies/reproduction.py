@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from merge_cosim.ngsim.pairing.encounters import site_encounters
-from merge_cosim.ngsim.sites import SITES
 from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.studies.training import train
@@ -80,7 +79,7 @@ def studies(data: Path | None, out: Path, jobs: int, seed: int, say: Say | None 
         train("us101", data, source, "car", seed, model)
         here = replace(base, source=source, model=str(model))
         tests = replace(here, scenarios=(*(f"{site}-replay" for site in sites), "designed-1"))
-        if len(sites) < len(SITES):  # designed-1 takes its initial states from the sites that there are
+        if len(sites) < len(PARTS):  # designed-1 takes its initial states from the sites that there are
             tests = replace(tests, settings={"encounters.sites": {site: PARTS[site] for site in sites}})
         found.append(Study(PAIRS, source, tests))
         varied = [("pgm.nodes", NODES)]
@@ -90,12 +89,12 @@ def studies(data: Path | None, out: Path, jobs: int, seed: int, say: Say | None 
 
 
 PARTS = {"us101": "test", "i80": "all"}
-"""Which part of each site's pairs is tested: the model is trained on the rest of US-101."""
+"""The papers' sites, and which part of each one's pairs is tested: the model is trained on the rest of US-101."""
 
 
 def _sites(data: Path | None) -> dict[SourceChoice, list[str]]:
     """The sites that each source has pairs of; real ones only with US-101, which the model is trained on."""
-    everywhere = [site.name for site in SITES]
+    everywhere = list(PARTS)
     real = [name for name in everywhere if data and _has_pairs(name, data)]
     return {"surrogate": everywhere, "ngsim": real} if "us101" in real else {"surrogate": everywhere}
 

@@ -11,6 +11,7 @@ from merge_cosim.core.encounter import Intention
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.learned.fitting import fit
 from merge_cosim.ngsim.pairing.split import split_cars
+from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.scenarios.encounters import SourceChoice, pairs_of_site
 from merge_cosim.scenarios.sources import Pairs
 from merge_cosim.studies.judging import density_losses, judge
@@ -30,7 +31,8 @@ def train(
     encounters = pairs_of_site(site, pairs, data, source)
     chosen = split_cars(encounters, pairs.fraction, pairs.seed, pairs.split)
     train_part = encounters.take(np.flatnonzero(chosen))
-    settings = {"split": split, "fraction": pairs.fraction, "seed": seed, "rules": vars(pairs.rules)}
+    rules = pairs.rules.over(find_site(site).pairs)
+    settings = {"split": split, "fraction": pairs.fraction, "seed": seed, "rules": vars(rules)}
     model = fit(train_part, out.stem, settings)
     out.parent.mkdir(parents=True, exist_ok=True)
     model.save(out)

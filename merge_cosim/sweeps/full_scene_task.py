@@ -13,7 +13,6 @@ import pyarrow as pa
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import TOLERANCE, IntArray
 from merge_cosim.ngsim.pairing.recordings import LoggedScene, episode_scenes, pair_in_scene, site_scenes
-from merge_cosim.ngsim.sites import US101
 from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.ramps.ramp import Ramp
@@ -127,6 +126,5 @@ def load_scenes(scenario: Scenario, source: str, data: Path | None) -> dict[str,
         if source == "surrogate":
             scenes |= site_scenes(surrogate_folder(site), site, pairs.rules)
         elif data is not None:
-            episodes = episode_scenes(data, pairs.rules) if site == US101 else {}
-            scenes |= {**episodes, **site_scenes(data, site, pairs.rules)}
+            scenes |= {**episode_scenes(data, site, pairs.rules), **site_scenes(data, site, pairs.rules)}
     return scenes

@@ -4,7 +4,9 @@ from ngsim_files import car, write_csv, write_portal
 from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.convert import Recording, convert
 from merge_cosim.ngsim.data import load_trajectories
-from merge_cosim.ngsim.sites import I80, US101
+from merge_cosim.ngsim.sites import site
+
+US101, I80 = site("us101"), site("i80")
 
 
 @pytest.fixture
@@ -17,8 +19,8 @@ def portal(tmp_path):
 def test_one_file_per_site(portal, tmp_path):
     done = convert([portal], tmp_path / "out")
     assert done.recordings == [
-        Recording("us101", "2005-06-15T0750", 8, 2),
         Recording("i80", "2005-04-13T1559", 4, 1),
+        Recording("us101", "2005-06-15T0750", 8, 2),
     ]
     assert (done.rows, done.kept, done.elsewhere) == (13, 12, {"lankershim": 1})
     assert load_trajectories(tmp_path / "out", US101).num_rows == 8

@@ -11,8 +11,10 @@ from ngsim_files import HEADER, ORIGIN, car, write_csv, write_portal, write_text
 from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim import blocks
 from merge_cosim.ngsim.read import merge, read_file
-from merge_cosim.ngsim.sites import I80, US101
+from merge_cosim.ngsim.sites import site
 from merge_cosim.ngsim.table import Repeats
+
+US101, I80 = site("us101"), site("i80")
 
 ROWS = car(1, range(10, 16)) + car(1002, range(12, 15), lane=6, y=600.0)
 
@@ -96,7 +98,7 @@ def test_a_text_of_another_place_has_no_known_site(tmp_path):
     rows = [row | {"Global_X": 0.0} for row in ROWS]
     reading = read_file(write_text(tmp_path / "a.txt", rows))
     assert reading.tables == {}
-    assert reading.elsewhere == {"outside both study areas": len(rows)}
+    assert reading.elsewhere == {"outside all study areas": len(rows)}
     assert read_file(write_text(tmp_path / "b.txt", car(1, range(2), location="i-80"))).tables.keys() == {"i80"}
 
 

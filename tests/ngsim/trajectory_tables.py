@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import pyarrow as pa
 
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
 from merge_cosim.ngsim.table import SCHEMA
+
+US101 = site("us101")
 
 GORE = US101.gore_y
 

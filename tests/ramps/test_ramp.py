@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
-from merge_cosim.ngsim.sites import SITES
+from merge_cosim.ngsim.sites import shipped_sites
 from merge_cosim.ramps.ramp import LanePosition, Ramp, ramp_names
 
 NAMES = ("designed", "i80", "us101")
@@ -137,7 +137,7 @@ def test_a_mistake_in_the_file_is_one_clear_line(tmp_path: Path, old: str, new: 
 
 
 def test_gore_is_where_the_trajectories_have_it() -> None:
-    for site in SITES:
+    for site in shipped_sites():
         mapping = Ramp.load(site.name).ngsim
         assert mapping is not None
         assert mapping.gore_local_y == pytest.approx(site.gore_y, abs=0.01)

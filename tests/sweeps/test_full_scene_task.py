@@ -17,13 +17,15 @@ from merge_cosim.ngsim.pairing.pairs import extract_pairs
 from merge_cosim.ngsim.pairing.recordings import scenes_of
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.tracks import build_tracks
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
 from merge_cosim.results.store import SCENE_FACTS
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.sweeps.full_scene_task import SceneReplay, load_scenes
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.task import Batch, WorkerSession
+
+US101 = site("us101")
 
 AROUND = ("min_leader_gap_m", "min_leader_ttc_s", "min_follower_gap_m")
 METHODS = ("acc", "slot", "pgm", "fg", "ipcb", "always-go", "always-yield", "acc+brake")

@@ -1,4 +1,4 @@
-"""All encounters of a site that a data folder holds: pairs of its trajectories, and the US-101 episodes beside them."""
+"""All encounters of a site that a data folder holds: pairs of its trajectories, and its episodes beside them."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from merge_cosim.core.encounter import Encounters, Ragged
 from merge_cosim.core.files import cache_folder
 from merge_cosim.ngsim.data import READER_VERSION, episode_files, load_trajectories
 from merge_cosim.ngsim.pairing.checks import without_failures
-from merge_cosim.ngsim.pairing.episodes import EPISODES_FROM, read_episodes
+from merge_cosim.ngsim.pairing.episodes import read_episodes
 from merge_cosim.ngsim.pairing.pairs import Paired, extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.stored import read_pairs, write_pairs
-from merge_cosim.ngsim.sites import US101, Site
+from merge_cosim.ngsim.sites import Site
 
 PAIRS_VERSION = 1
 """Raised when the same trajectories would be paired differently, so that cached pairs are made anew."""
@@ -30,8 +30,8 @@ COMPLETE_CARS = 1_000
 """A recording with more cars than this is a complete 15-minute period of NGSIM (they have 1,790 to 2,169), no fragment
 of one. It holds the merges of the episodes itself, so these are then left out."""
 
-Source = Literal["ngsim", "surrogate"]
-"""Whether cars were filmed or simulated."""
+Source = Literal["ngsim", "recorded", "surrogate"]
+"""Whether cars were filmed, by NGSIM or elsewhere, or simulated."""
 
 CACHE_FROM = 1.0
 """Pairs that take longer than this [s] to extract are cached."""
@@ -42,26 +42,28 @@ def site_pairs(
     site: Site,
     rules: PairRules | None = None,
     *,
-    source: Source = "ngsim",
-    episodes_from: int = EPISODES_FROM,
+    source: Source | None = None,
+    episodes_from: int | None = None,
 ) -> Paired | None:
     """Return the pairs of `site` in a data folder, and what was rejected; None where the folder has nothing of it.
 
     Pairs whose logged host fails (see `checks`) are among the rejected.
 
     Args:
-        data: Folder with NGSIM files (or one such file).
+        data: Folder with trajectory files (or one such file).
         site: The site.
-        rules: The thresholds; None for the defaults.
-        source: What the folder holds.
-        episodes_from: First US-101 episode to use beside the trajectories; the ones before are the same merges as in
-            the published fragments.
+        rules: The thresholds, those that are not set as the site has them; None for the site's.
+        source: What the folder holds; None for the site's own recordings.
+        episodes_from: First episode to use beside the trajectories; None for the site's.
 
     Raises:
         UserError: A file is damaged.
     """
-    rules = rules or PairRules()
-    choices = (site.name, source, repr(rules), str(episodes_from), str(COMPLETE_CARS))
+    rules = (rules or PairRules()).over(site.pairs)
+    source = source or site.source
+    if episodes_from is None:
+        episodes_from = site.recording.episodes_from
+    choices = (repr(site), source, repr(rules), str(episodes_from), str(COMPLETE_CARS))
     key = "|".join([*_identity(data), *choices, *_versions()])
     cached = cache_folder("encounters") / f"{site.name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.parquet"
     if cached.is_file():
@@ -81,8 +83,8 @@ def site_encounters(
     site: Site,
     rules: PairRules | None = None,
     *,
-    source: Source = "ngsim",
-    episodes_from: int = EPISODES_FROM,
+    source: Source | None = None,
+    episodes_from: int | None = None,
 ) -> Encounters | None:
     """Return the encounters of `site_pairs` alone; station 0 is each merging car's own lane change."""
     paired = site_pairs(data, site, rules, source=source, episodes_from=episodes_from)
@@ -119,13 +121,13 @@ def at_site_point(encounters: Encounters) -> Encounters:
     return moved.take(np.flatnonzero(moved.merging_station < 0))
 
 
-def _parts(data: Path, site: Site, rules: PairRules, source: Source, episodes_from: int) -> Iterator[Paired]:
+def _parts(data: Path, site: Site, rules: PairRules, source: Source, episodes_from: int | None) -> Iterator[Paired]:
     table = load_trajectories(data, site)
     if table is not None:
         yield extract_pairs(table, site, rules, source)
-    if site == US101 and not (table is not None and _most_cars(table) > COMPLETE_CARS):
+    if episodes_from is not None and not (table is not None and _most_cars(table) > COMPLETE_CARS):
         for path in episode_files(data):
-            yield read_episodes(path, rules, episodes_from)
+            yield read_episodes(path, site, rules, episodes_from)
 
 
 def _most_cars(table: pa.Table) -> int:

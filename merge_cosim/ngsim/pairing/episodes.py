@@ -1,4 +1,4 @@
-"""The 68 published US-101 merging episodes: short real merges that end at the lane change.
+"""NGSIM's merging episodes, 68 of them published for US-101: short real merges that end at the lane change.
 
 Each starts with the merging car (car 0) in the auxiliary lane; the other cars, tracked by continuity, are in the host
 lane as long as they are there. Positions are in metres from the gore, times in cycles; there are no lengths, no clock
@@ -12,29 +12,22 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.units import FOOT, FloatArray
+from merge_cosim.core.units import FloatArray
 from merge_cosim.ngsim.pairing.pairs import Paired, pair_tracks
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.smoothing import smooth_tracks
 from merge_cosim.ngsim.pairing.tracks import Tracks
-from merge_cosim.ngsim.sites import US101
-
-ORIGIN_Y = 613 * FOOT
-"""Local_Y [m] of the episodes' station 0, found by matching 12 of their merges in the original data."""
-
-EPISODES_FROM = 26
-"""First episode to use beside US-101 fragments: the ones before fall into the time of the fragments, so that the same
-merge would count twice, and could stand on both sides of a split."""
+from merge_cosim.ngsim.sites import Site
 
 COLUMNS = ("episode", "frame", "car", "station_m", "speed_m_s")
 
 
-def read_episodes(path: Path, rules: PairRules, first: int = EPISODES_FROM) -> Paired:
+def read_episodes(path: Path, site: Site, rules: PairRules, first: int = 0) -> Paired:
     """Pair the merging car of each episode with the nearest cars ahead and behind at its end; see `episode_tracks`."""
-    return pair_tracks(episode_tracks(path, rules, first), US101, rules, source="ngsim")
+    return pair_tracks(episode_tracks(path, site, rules, first), site, rules, site.source)
 
 
-def episode_tracks(path: Path, rules: PairRules, first: int = EPISODES_FROM) -> Tracks:
+def episode_tracks(path: Path, site: Site, rules: PairRules, first: int = 0) -> Tracks:
     """Read the cars of the episodes: the merging car, in the host lane in its last row alone, and its neighbours there.
 
     Every length is missing. The episodes' positions carry no jitter (their second differences are as small as those
@@ -42,6 +35,7 @@ def episode_tracks(path: Path, rules: PairRules, first: int = EPISODES_FROM) -> 
 
     Args:
         path: The Parquet file, with `COLUMNS`.
+        site: Where they were recorded.
         rules: The thresholds.
         first: Number of the first episode to use.
 
@@ -75,11 +69,11 @@ def episode_tracks(path: Path, rules: PairRules, first: int = EPISODES_FROM) -> 
         first_frame=frame[starts].astype(np.int64),
         length=np.full(len(starts), np.nan),
         offsets=offsets,
-        y=smooth + ORIGIN_Y,
+        y=smooth + site.gore_y,
         speed=speed,
         on_ramp=(car == 0) & ~changes,
         in_host=(car != 0) | changes,
-        lane=np.where((car != 0) | changes, US101.host_lane, US101.ramp_lanes[0]),
+        lane=np.where((car != 0) | changes, site.host_lane, site.ramp_lanes[0]),
         smoothed=np.ones(len(order), dtype=bool),
     )
 

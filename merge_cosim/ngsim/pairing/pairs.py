@@ -50,7 +50,7 @@ def extract_pairs(table: pa.Table, site: Site, rules: PairRules, source: str) ->
         table: Trajectories of `site`, sorted by recording, vehicle, part and frame.
         site: Lanes and gore.
         rules: The thresholds.
-        source: `ngsim` or `surrogate`.
+        source: What the encounters name as their source.
     """
     return pair_tracks(build_tracks(table, site, rules), site, rules, source)
 

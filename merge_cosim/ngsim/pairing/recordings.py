@@ -16,11 +16,10 @@ import numpy as np
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, IntArray
 from merge_cosim.ngsim.data import episode_files, load_trajectories
-from merge_cosim.ngsim.pairing.episodes import EPISODES_FROM, episode_tracks
+from merge_cosim.ngsim.pairing.episodes import episode_tracks
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.tracks import Tracks, build_tracks
-from merge_cosim.ngsim.sites import US101, Site
-from merge_cosim.ngsim.sites import site as find_site
+from merge_cosim.ngsim.sites import Site
 
 
 @dataclass(frozen=True)
@@ -31,6 +30,7 @@ class LoggedScene:
 
     Attributes:
         site: Name of the site.
+        host_lane: Number of its host lane.
         recording: Name of the recording.
         car: Name of each car, `vehicle.part`, shape (n,).
         vehicle: Its number in the recording, shape (n,).
@@ -39,10 +39,11 @@ class LoggedScene:
         enters: First cycle of each car; the earliest is 0, shape (n,).
         offsets: Where each car's rows start, shape (n + 1,).
         x: Smoothed position of the front bumper [m past the gore], which never decreases, shape (rows,).
-        lane: NGSIM's lane number, flicker removed, shape (rows,); see `Tracks.lane`.
+        lane: The recording's lane number, flicker removed, shape (rows,); see `Tracks.lane`.
     """
 
     site: str
+    host_lane: int
     recording: str
     car: AnyArray
     vehicle: IntArray
@@ -125,6 +126,7 @@ def scenes_of(tracks: Tracks, site: Site, rules: PairRules) -> dict[str, LoggedS
         names = [f"{v}.{p}" for v, p in zip(tracks.vehicle[here], tracks.part[here], strict=True)]
         scenes[recording] = LoggedScene(
             site=site.name,
+            host_lane=site.host_lane,
             recording=recording,
             car=np.array(names, dtype=object),
             vehicle=tracks.vehicle[here],
@@ -144,22 +146,24 @@ def site_scenes(data: Path, site: Site, rules: PairRules | None = None) -> dict[
     Raises:
         UserError: A file is damaged.
     """
-    rules = rules or PairRules()
+    rules = (rules or PairRules()).over(site.pairs)
     table = load_trajectories(data, site)
     return {} if table is None else scenes_of(build_tracks(table, site, rules, everywhere=True), site, rules)
 
 
-def episode_scenes(data: Path, rules: PairRules | None = None, first: int = EPISODES_FROM) -> dict[str, LoggedScene]:
-    """Return the US-101 episodes as scenes: the merging car and its neighbours in the host lane, all without a length.
+def episode_scenes(data: Path, site: Site, rules: PairRules | None = None) -> dict[str, LoggedScene]:
+    """Return a site's episodes as scenes: the merging car and its neighbours in the host lane, all without a length.
 
     Raises:
         UserError: A file is damaged.
     """
-    rules = rules or PairRules()
+    rules, first = (rules or PairRules()).over(site.pairs), site.recording.episodes_from
+    if first is None:
+        return {}
     return {
         name: scene
         for path in episode_files(data)
-        for name, scene in scenes_of(episode_tracks(path, rules, first), US101, rules).items()
+        for name, scene in scenes_of(episode_tracks(path, site, rules, first), site, rules).items()
     }
 
 
@@ -177,6 +181,6 @@ def pair_in_scene(scenes: dict[str, LoggedScene], encounters: Encounters, row: i
     scene.index(host)
     car = scene.index(merging)
     lane = scene.lane[scene.offsets[car] : scene.offsets[car + 1]]
-    change = int(np.argmax(lane == find_site(scene.site).host_lane))
+    change = int(np.argmax(lane == scene.host_lane))
     start = int(scene.enters[car]) + change - int(encounters.log.change_cycle[row])
     return scene, PairInScene(host, merging, start)

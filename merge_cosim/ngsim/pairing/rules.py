@@ -1,7 +1,10 @@
 """The rules by which logged cars become encounters: every threshold, in one place."""
 
-from dataclasses import dataclass
-from typing import Literal
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT
@@ -12,9 +15,10 @@ def cycles(seconds: float) -> int:
     return round(seconds / DT)
 
 
-@dataclass(frozen=True)
-class PairRules:
+class PairRules(BaseModel):
     """When a host and a merging car make a pair, and how their logs are filtered.
+
+    A site may set its own values (`[pairs]` of its `site.toml`); what a scenario sets stands above them.
 
     Attributes:
         max_host_distance: A host is at most this far from the merging car at the lane change, front to front [m].
@@ -32,6 +36,8 @@ class PairRules:
         observed_order: Order of its polynomial.
     """
 
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
     max_host_distance: float = 60.0
     min_window: float = 2.0
     max_window: float | None = None
@@ -45,7 +51,12 @@ class PairRules:
     observed_window: int = 11
     observed_order: int = 1
 
-    def __post_init__(self) -> None:
+    def over(self, base: PairRules) -> PairRules:
+        """Return these rules, with the values of `base` where these were not set."""
+        return PairRules(**base.model_dump(exclude_unset=True) | self.model_dump(exclude_unset=True))
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
         if self.smoothing_window % 2 == 0 or self.smoothing_window <= self.smoothing_order:
             raise UserError(
                 f"pair rules: smoothing_window is {self.smoothing_window}; it must be odd and greater than "
@@ -61,5 +72,4 @@ class PairRules:
                 f"pair rules: min_window is {self.min_window} s and max_window {self.max_window}; windows need "
                 f"0.1 s <= min_window <= max_window"
             )
-        if self.observed not in ("causal", "raw"):
-            raise UserError(f"pair rules: observed is {self.observed!r}; choose causal or raw")
+        return self

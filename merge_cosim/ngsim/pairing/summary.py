@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from merge_cosim.core.units import DT
 from merge_cosim.ngsim.pairing.checks import HORIZON, replay_logged_host
 from merge_cosim.ngsim.pairing.encounters import site_pairs
 from merge_cosim.ngsim.pairing.pairs import Paired
-from merge_cosim.ngsim.sites import SITES
+from merge_cosim.ngsim.sites import Site, shipped_sites
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def summarise(paired: Paired, site: str, source: str = "ngsim", horizon: float =
     Args:
         paired: Its pairs, such as `encounters.site_pairs` returns.
         site: Name of the site.
-        source: `ngsim` or `surrogate`.
+        source: Their source.
         horizon: Scored time [s].
     """
     e, log = paired.encounters, paired.encounters.log
@@ -116,18 +117,24 @@ def summarise(paired: Paired, site: str, source: str = "ngsim", horizon: float =
     )
 
 
-def summarise_folder(data: Path) -> list[Summary]:
+def summarise_folder(data: Path, sites: Sequence[Site] = ()) -> list[Summary]:
     """Compute the numbers of every site that a data folder (or file) holds.
 
+    Args:
+        data: The folder or file.
+        sites: The sites to look for; the shipped ones if none is given.
+
     Raises:
-        UserError: It does not exist, a file is damaged, or there is nothing of either site.
+        UserError: It does not exist, a file is damaged, or there is nothing of these sites.
     """
     if not data.exists():
         raise UserError(f"{data}: no such folder")
-    found = {known.name: site_pairs(data, known) for known in SITES}
-    summaries = [summarise(paired, name) for name, paired in found.items() if paired is not None]
+    sites = sites or shipped_sites()
+    found = [(each, site_pairs(data, each)) for each in sites]
+    summaries = [summarise(paired, each.name, each.source) for each, paired in found if paired is not None]
     if not summaries:
-        raise UserError(f"{data}: no trajectories of {' or '.join(found)} that could make pairs; put NGSIM files there")
+        names = " or ".join(each.name for each in sites)
+        raise UserError(f"{data}: no trajectories of {names} that could make pairs; put their files there")
     return summaries
 
 

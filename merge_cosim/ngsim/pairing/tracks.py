@@ -26,8 +26,8 @@ class Tracks:
         speed: Logged speed [m/s], shape (rows,).
         on_ramp: In an on-ramp lane, shape (rows,).
         in_host: In the host lane, flicker removed, shape (rows,).
-        lane: NGSIM's lane number, flicker removed, shape (rows,). The lanes beside the main road (on-ramp, auxiliary
-            lane, off-ramp) are one path and all have the number of the site's first on-ramp lane.
+        lane: The recording's lane number, flicker removed, shape (rows,). The lanes beside the main road (on-ramp,
+            auxiliary lane, off-ramp) are one path and all have the number of the site's first on-ramp lane.
         smoothed: Smoothed by the source before it was published, shape (rows,).
     """
 
@@ -92,13 +92,14 @@ def build_tracks(table: pa.Table, site: Site, rules: PairRules, *, everywhere: b
     for key in (codes, vehicle, part):
         starts_here[1:] |= key[1:] != key[:-1]
     starts = np.flatnonzero(starts_here)
-    near = np.isin(lane, (*site.ramp_lanes, site.host_lane))
+    near = np.isin(lane, (*site.ramp_lanes, *site.lanes.host))
     lengths = np.diff(np.append(starts, len(lane)))
     wanted = np.logical_or.reduceat(near | everywhere, starts) if len(starts) else np.empty(0, dtype=bool)
     rows = np.flatnonzero(np.repeat(wanted, lengths))
     starts, lengths = starts[wanted], lengths[wanted]
     offsets = np.append(0, np.cumsum(lengths)).astype(np.int64)
-    path = np.where(np.isin(lane[rows], site.side_lanes), site.ramp_lanes[0], lane[rows]).astype(np.int64)
+    lane = _told_lanes(lane[rows], offsets[:-1], site)
+    path = np.where(np.isin(lane, site.side_lanes), site.ramp_lanes[0], lane).astype(np.int64)
     return Tracks(
         recording=np.asarray(recording.dictionary.to_pylist(), dtype=object)[codes[starts]],
         vehicle=vehicle[starts].astype(np.int64),
@@ -108,11 +109,26 @@ def build_tracks(table: pa.Table, site: Site, rules: PairRules, *, everywhere: b
         offsets=offsets,
         y=smooth_tracks(table["y"].to_numpy()[rows], offsets, rules.smoothing_window, rules.smoothing_order),
         speed=np.asarray(table["speed"].to_numpy()[rows], dtype=np.float64),
-        on_ramp=np.isin(lane[rows], site.ramp_lanes),
-        in_host=without_flicker(lane[rows] == site.host_lane, offsets, cycles(rules.hold)),
+        on_ramp=np.isin(lane, site.ramp_lanes),
+        in_host=without_flicker(lane == site.host_lane, offsets, cycles(rules.hold)),
         lane=steady_lanes(path, offsets, cycles(rules.hold)),
         smoothed=table["smoothed"].to_numpy()[rows],
     )
+
+
+def _told_lanes(lane: AnyArray, starts: IntArray, site: Site) -> AnyArray:
+    """Give the host lane one number, and a car in a shared lane the lane that it had before (at first the host lane).
+
+    Args:
+        lane: Lane numbers as logged, tracks end to end, shape (rows,).
+        starts: First row of each track.
+        site: What the numbers mean.
+    """
+    lane = np.where(np.isin(lane, site.lanes.host), site.host_lane, lane)
+    shared = np.isin(lane, site.lanes.shared)
+    lane[starts[shared[starts]]] = site.host_lane
+    shared[starts] = False
+    return lane[np.maximum.accumulate(np.where(shared, 0, np.arange(len(lane))))]
 
 
 def without_flicker(in_lane: BoolArray, offsets: IntArray, hold: int) -> BoolArray:

@@ -65,7 +65,7 @@ def ngsim_rows(trajectories: Path, recipe: Recipe, ramp: Ramp, site: Site, recor
             "v_Vel": _feet(run["vehicle_speed"].to_numpy()),
             "v_Acc": _feet(run["vehicle_acceleration"].to_numpy()),
             "Lane_ID": lane,
-            "Location": site.location,
+            "Location": site.recording.location,
             "segment": f"surrogate_{recording + 1}",
         }
     )

@@ -32,7 +32,16 @@ PROCESSES = 2
 
 
 def surrogate_folder(site: Site) -> Path:
-    """Return the folder with the synthetic trajectories of `site`; made first, with SUMO, if they are not cached."""
+    """Return the folder with the synthetic trajectories of `site`; made first, with SUMO, if they are not cached.
+
+    Raises:
+        UserError: There is no surrogate of this site.
+    """
+    if site.name not in RECIPES:
+        names = " and ".join(RECIPES)
+        raise UserError(
+            f"site {site.name}: there is no surrogate of it (only of {names}); give its data with --data DIR"
+        )
     return cached_surrogate(RECIPES[site.name])
 
 

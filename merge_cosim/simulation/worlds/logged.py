@@ -18,7 +18,6 @@ from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
 from merge_cosim.ngsim.pairing.recordings import LoggedScene, PairInScene
-from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import view_options
 from merge_cosim.scoring.surroundings import SIGHT, InLane, Neighbours
@@ -98,7 +97,7 @@ class LoggedWorld:
         self._host_log, self._merging_log = log.host_station[case], log.merging_station[case]
         self._takes_over = round(min(self._rules.take_over / DT, len(self._host_log) - 1))
         self._lengths = dict(zip(scene.car.tolist(), scene.length.tolist(), strict=True))
-        self._host_lane = find_site(scene.site).host_lane
+        self._host_lane = scene.host_lane
         self.neighbours = Neighbours(self._lengths[pair.host], SIGHT)
         self.leader_speed = 0.0
         self._others_touched: set[tuple[str, ...]] = set()

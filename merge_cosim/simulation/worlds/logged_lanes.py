@@ -52,7 +52,7 @@ class Roadway:
         """
         if ramp.ngsim is None:
             raise UserError(f"{ramp.net.parent / FILE_NAME}: no [ngsim] table says where logged lanes lie in the net")
-        site = find_site(ramp.name)
+        site = find_site(ramp.net.parent)
         net = read_net(ramp.net)
         starts = {section.edge: section.start for section in (*ramp.main, *ramp.ramp)}
         strips = []

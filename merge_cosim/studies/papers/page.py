@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from merge_cosim.estimators.learned.model import IntentionModel
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.report import belief_figures, case_figures, model_figures
 from merge_cosim.report.columns import Table
@@ -202,7 +202,8 @@ def _paths(case: cases.NamedCase, drawn: Mapping[str, Look]) -> list[Picture]:
 
 
 def _on_camera(data: Path | None) -> Part:
-    figure = figures.overlap_figure(data or surrogate_folder(US101), US101)
+    us101 = site("us101")
+    figure = figures.overlap_figure(data or surrogate_folder(us101), us101)
     caption = "Time on camera of a host, the car ahead of it, and the merging cars that change lane near it."
     return Part("Who is on camera when (FG-GMM, Fig. 4)", pictures=[Picture.of(figure, caption)])
 

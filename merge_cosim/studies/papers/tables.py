@@ -11,7 +11,8 @@ import pandas as pd
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ngsim.pairing.encounters import site_pairs
 from merge_cosim.ngsim.pairing.summary import Summary, summarise, summarise_folder
-from merge_cosim.ngsim.sites import SITES
+from merge_cosim.ngsim.sites import site as find_site
+from merge_cosim.ngsim.surrogate.recipe import RECIPES
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order, is_reference
@@ -245,7 +246,7 @@ def mixture(model: IntentionModel) -> Table:
 
 def _surrogate_summaries() -> list[Summary]:
     found = []
-    for site in SITES:
+    for site in map(find_site, RECIPES):
         pairs = site_pairs(surrogate_folder(site), site, source="surrogate")
         assert pairs is not None
         found.append(summarise(pairs, site.name, "surrogate"))

@@ -9,7 +9,9 @@ from merge_cosim.ngsim.pairing.checks import replay_logged_host, without_failure
 from merge_cosim.ngsim.pairing.episodes import read_episodes
 from merge_cosim.ngsim.pairing.pairs import Paired, extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
+
+US101 = site("us101")
 
 MERGE = [6] * 30 + [5] * 60
 """Merges in frame 30; a host 10 m behind with the same speed reaches the merging point in cycle 37."""
@@ -67,5 +69,5 @@ def test_real_logged_hosts(data_dir: Path) -> None:
     assert table is not None
     fragments = extract_pairs(table, US101, PairRules(), "ngsim").encounters
     assert fragments.case[replay_logged_host(fragments).failed].tolist() == []
-    episodes = read_episodes(data_dir / "us101_merging_episodes.parquet", PairRules(), first=0).encounters
+    episodes = read_episodes(data_dir / "us101_merging_episodes.parquet", US101, PairRules(), first=0).encounters
     assert episodes.case[replay_logged_host(episodes).failed].tolist() == ["episode-45-0.1-h3.1"]

@@ -12,7 +12,9 @@ from merge_cosim.ngsim.pairing.encounters import at_site_point, site_encounters,
 from merge_cosim.ngsim.pairing.pairs import extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.stored import read_pairs, write_pairs
-from merge_cosim.ngsim.sites import I80, US101
+from merge_cosim.ngsim.sites import site
+
+US101, I80 = site("us101"), site("i80")
 
 
 def merge_at(place: float, recording: str, hosts: int = 1) -> list[Car]:

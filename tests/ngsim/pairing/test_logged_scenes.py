@@ -12,7 +12,9 @@ from merge_cosim.ngsim.pairing.pairs import extract_pairs
 from merge_cosim.ngsim.pairing.recordings import episode_scenes, pair_in_scene, scenes_of, site_scenes
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.tracks import build_tracks
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
+
+US101 = site("us101")
 
 CARS = table(
     steady(1, [2] * 40, at=-50, frame=100),
@@ -61,7 +63,7 @@ def test_real_encounters_have_their_very_stations_in_the_scenes(data_dir: Path) 
     encounters = site_encounters(data_dir, US101)
     assert encounters is not None
     assert encounters.log is not None
-    scenes = {**site_scenes(data_dir, US101), **episode_scenes(data_dir)}
+    scenes = {**site_scenes(data_dir, US101), **episode_scenes(data_dir, US101)}
     for row in range(len(encounters)):
         scene, pair = pair_in_scene(scenes, encounters, row)
         logs = {pair.merging: encounters.log.merging_station[row], pair.host: encounters.log.host_station[row]}

@@ -7,7 +7,9 @@ from merge_cosim.core.encounter import NEVER, Intention
 from merge_cosim.core.units import DT
 from merge_cosim.ngsim.pairing.pairs import Paired, extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
+
+US101 = site("us101")
 
 RAMP = [7] * 15 + [6] * 15
 MERGE = RAMP + [5] * 60

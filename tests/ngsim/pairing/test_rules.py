@@ -16,7 +16,6 @@ def test_seconds_to_cycles() -> None:
         ({"observed_window": 1}, "observed_window"),
         ({"max_window": 1.0}, "max_window"),
         ({"min_window": 0.0}, "min_window"),
-        ({"observed": "future"}, "observed"),
     ],
 )
 def test_impossible_rules_are_refused(change: dict[str, object], named: str) -> None:

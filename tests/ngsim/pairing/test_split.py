@@ -8,7 +8,9 @@ from merge_cosim.core.encounter import Encounters
 from merge_cosim.ngsim.pairing.pairs import extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.split import split_cars
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
+
+US101 = site("us101")
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,9 @@ from merge_cosim.core.units import DT, time_to_arrival
 from merge_cosim.ngsim.pairing.pairs import extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.summary import summarise, summarise_folder
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
+
+US101 = site("us101")
 
 MERGE = [6] * 30 + [5] * 60
 
@@ -45,7 +47,7 @@ def test_no_pair_has_no_mean() -> None:
 
 
 def test_a_folder_without_trajectories(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no trajectories of us101 or i80"):
+    with pytest.raises(UserError, match="no trajectories of i80 or us101"):
         summarise_folder(tmp_path)
     with pytest.raises(UserError, match="no such folder"):
         summarise_folder(tmp_path / "nowhere")

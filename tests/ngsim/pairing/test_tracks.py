@@ -8,7 +8,9 @@ from trajectory_tables import GORE, steady, table
 
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.tracks import build_tracks, steady_lanes, without_flicker
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
+
+US101 = site("us101")
 
 
 def flicker(lanes: str, hold: int = 5) -> str:

@@ -13,17 +13,19 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import FOOT
 from merge_cosim.ngsim.data import load_trajectories
 from merge_cosim.ngsim.pairing.encounters import site_pairs
-from merge_cosim.ngsim.sites import SITES, US101, Site
+from merge_cosim.ngsim.sites import Site, shipped_sites, site
 from merge_cosim.ngsim.surrogate.ngsim_format import ngsim_rows
 from merge_cosim.ngsim.surrogate.recipe import RECIPES
 from merge_cosim.ngsim.surrogate.surrogate import cached_surrogate, export, generate, surrogate_folder
 from merge_cosim.ramps.ramp import Ramp, read_net
 
+US101 = site("us101")
+
 SHORT = {name: replace(recipe, seeds=(7, 8), duration=40.0, warm_up=60.0) for name, recipe in RECIPES.items()}
 NUMBER_OF_PAIRS = {"us101": 354, "i80": 452}
 """Published sizes (Dong, Dolan, Litkouhi 2017, Table I)."""
 
-sites = pytest.mark.parametrize("site", SITES, ids=lambda site: site.name)
+sites = pytest.mark.parametrize("site", shipped_sites(), ids=lambda site: site.name)
 
 
 def read(site: Site) -> pa.Table:

@@ -12,7 +12,7 @@ from trajectory_tables import Car, steady, table
 from merge_cosim.ngsim.pairing.recordings import LoggedScene, scenes_of, site_scenes
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.tracks import build_tracks
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.simulation.worlds.logged_lanes import Roadway
 from merge_cosim.simulation.worlds.logged_traffic import LoggedTraffic
@@ -20,6 +20,8 @@ from merge_cosim.sumo.options import LOGGED, SumoOptions
 from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.start import LibsumoSession
 from merge_cosim.sumo.vehicle_types import ReleasedDrivers
+
+US101 = site("us101")
 
 RAMP = Ramp.load("us101")
 ROAD = Roadway(RAMP)
