@@ -18,7 +18,7 @@ from lxml import etree
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
-from merge_cosim.sumo.routes import ROLE
+from merge_cosim.sumo.vehicle_types import ROLE
 
 DEMAND = ("vehicle", "trip", "flow", "person", "personFlow", "container", "containerFlow")
 """Elements that put something into the simulation."""

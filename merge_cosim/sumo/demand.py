@@ -11,12 +11,12 @@ from typing import Literal
 from lxml import etree
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
-from merge_cosim.core.units import HOUR
-from merge_cosim.ngsim.surrogate.recipe import DRIVERS
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import copy_view
-from merge_cosim.sumo.routes import COLORS, ROLE, configuration, element, write_xml
+from merge_cosim.sumo.routes import configuration
 from merge_cosim.sumo.tiles import tile_id, tile_net
+from merge_cosim.sumo.vehicle_types import COLORS, DRIVERS, ROLE, VehicleType, distribution
+from merge_cosim.sumo.xml import element, flow, speed_sign, write_xml
 
 SUBLANE = 0.8
 """Width of a sublane [m], which the lane-change model SL2015 works with."""
@@ -95,10 +95,11 @@ def write_traffic(folder: Path, demand: Demand, ramp: Ramp) -> Path:
 
 
 def _routes(demand: Demand, ramp: Ramp, prefixes: list[str]) -> etree._Element:
-    host = {"id": "host", "length": repr(HOST_LENGTH), "color": COLORS["host"], "sigma": "0", "speedDev": "0"}
-    root = element("routes", {}, element("vType", host, element("param", {"key": ROLE, "value": "host"})))
-    root.append(_drivers(demand, "through"))
-    root.append(_drivers(demand, "merging", ROLE))
+    host = VehicleType(
+        "host", length=HOST_LENGTH, color=COLORS["host"], sigma=0.0, speed_deviation=0.0, parameters={ROLE: "host"}
+    )
+    kinds = (host.element(), _drivers(demand, "through"), _drivers(demand, "merging", {ROLE: "merging"}))
+    root = element("routes", {}, *kinds)
     exits = _exit_route(ramp)
     flows = {
         "through": ("through", demand.through, ramp.main_route, "random", False),
@@ -106,44 +107,28 @@ def _routes(demand: Demand, ramp: Ramp, prefixes: list[str]) -> etree._Element:
         "merging": ("merging", demand.merging, ramp.ramp_route, "first", True),
         "host": ("host", demand.hosts, ramp.main_route, str(ramp.main[0].lane), False),
     }
-    for name, (kind_of, per_hour, route, lane, even) in flows.items():  # hosts last: SUMO reads flows in time's order
+    for name, (kind, per_hour, route, lane, even) in flows.items():  # hosts last: SUMO reads flows in time's order
+        begin = demand.warm_up if name == "host" else 0.0
         for prefix in prefixes if per_hour else ():
-            apart = HOUR / per_hour
-            flow = {
-                "id": f"{prefix}{name}",
-                "type": kind_of,
-                "begin": repr(demand.warm_up if name == "host" else 0.0),
-                "end": repr(demand.duration),
-                "period": repr(apart) if even else f"exp({1 / apart!r})",
-                "departLane": lane,
-                "departSpeed": "avg",
-            }
-            root.append(element("flow", flow, element("route", {"edges": " ".join(prefix + edge for edge in route)})))
+            edges = [prefix + edge for edge in route]
+            root.append(flow(prefix + name, kind, edges, per_hour, even, begin, demand.duration, departLane=lane))
     return root
 
 
-def _drivers(demand: Demand, name: str, parameter: str = "") -> etree._Element:
-    """The kinds of drivers of a flow; each type carries `parameter` with the name as its value."""
-    kinds = element("vTypeDistribution", {"id": name})
-    for number, driver in enumerate(DRIVERS):
-        how = {
-            "id": f"{name}-{number}",
-            "probability": repr(driver.share),
-            "length": repr(driver.length),
-            "tau": repr(driver.tau),
-            "accel": repr(driver.accel),
-            "decel": repr(driver.decel),
-            "carFollowModel": demand.car_following,
-            "laneChangeModel": demand.lane_changing,
-            "speedDev": repr(demand.speed_deviation),
-            "lcCooperative": repr(demand.cooperative),
-            "lcAssertive": repr(demand.assertive),
-            **({"sigma": repr(demand.imperfection)} if demand.car_following != "IDM" else {}),
-            **({"color": COLORS[name]} if name in COLORS else {}),
-        }
-        parameters = [element("param", {"key": parameter, "value": name})] if parameter else []
-        kinds.append(element("vType", how, *parameters))
-    return kinds
+def _drivers(demand: Demand, name: str, parameters: dict[str, str] | None = None) -> etree._Element:
+    """The kinds of drivers of a flow; each type carries the parameters."""
+    return distribution(
+        name,
+        DRIVERS,
+        car_following=demand.car_following,
+        lane_changing=demand.lane_changing,
+        speed_deviation=demand.speed_deviation,
+        cooperative=demand.cooperative,
+        assertive=demand.assertive,
+        sigma=demand.imperfection if demand.car_following != "IDM" else None,
+        color=COLORS.get(name),
+        parameters=parameters or {},
+    )
 
 
 def _exit_route(ramp: Ramp) -> tuple[str, ...]:
@@ -161,7 +146,7 @@ def _signs(demand: Demand, ramp: Ramp, prefixes: list[str]) -> etree._Element:
     if demand.ramp_speed:
         own = [section.edge for section in ramp.ramp if section.edge not in ramp.main_route]
         steps = [(0.0, demand.ramp_speed)]
-        root.extend(_sign(prefix + lane, steps) for lane in ramp.lanes_of(*own) for prefix in prefixes)
+        root.extend(speed_sign(prefix + lane, steps) for lane in ramp.lanes_of(*own) for prefix in prefixes)
     if demand.wave_every:
         past = [section.edge for section in ramp.main if section.start >= min(ramp.auxiliary_end, ramp.main[-1].start)]
         steps = [(0.0, ramp.speed_limit)]
@@ -169,10 +154,5 @@ def _signs(demand: Demand, ramp: Ramp, prefixes: list[str]) -> etree._Element:
         while begin < demand.duration:
             steps += [(begin, demand.wave_speed), (begin + demand.wave_lasts, ramp.speed_limit)]
             begin += demand.wave_every
-        root.extend(_sign(prefix + lane, steps) for lane in ramp.lanes_of(*past) for prefix in prefixes)
+        root.extend(speed_sign(prefix + lane, steps) for lane in ramp.lanes_of(*past) for prefix in prefixes)
     return root
-
-
-def _sign(lane: str, steps: list[tuple[float, float]]) -> etree._Element:
-    shown = (element("step", {"time": repr(time), "speed": repr(speed)}) for time, speed in steps)
-    return element("variableSpeedSign", {"id": lane, "lanes": lane}, *shown)

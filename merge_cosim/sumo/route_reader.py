@@ -14,7 +14,7 @@ from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.sumo.configuration import Configuration, parse
-from merge_cosim.sumo.routes import MERGE_POSITION, ROLE
+from merge_cosim.sumo.vehicle_types import MERGE_POSITION, ROLE
 
 ROLES = ("host", "merging")
 DEFAULT_LENGTH = 5.0

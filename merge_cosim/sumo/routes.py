@@ -1,6 +1,7 @@
 """One encounter as ordinary SUMO files: to be shown in sumo-gui, or kept and changed by hand."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from lxml import etree
@@ -11,14 +12,8 @@ from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import FILE_NAME as VIEW
 from merge_cosim.ramps.view import copy_view
 from merge_cosim.sumo.options import STEP, WRITTEN, Options
-
-ROLE = "merge-cosim.role"
-"""Parameter of a vehicle type: `host` or `merging`."""
-MERGE_POSITION = "merge-cosim.merge-position"
-"""Parameter of the merging car's type: where its station 0 lies, in m past the gore."""
-
-COLORS = {"host": "40,160,60", "merging": "210,50,40"}
-"""As in the papers' figures."""
+from merge_cosim.sumo.vehicle_types import COLORS, CONTROLLED, MERGE_POSITION, ROLE
+from merge_cosim.sumo.xml import element, number, write_xml
 
 
 def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) -> Path:
@@ -41,19 +36,13 @@ def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) 
     for role, (station, speed, length) in states.items():
         where = ramp.place("main" if role == "host" else "ramp", float(station[row]), merge_position)
         route = ramp.main_route if role == "host" else ramp.ramp_route
-        parameters = {ROLE: role} | ({MERGE_POSITION: _number(merge_position)} if role == "merging" else {})
-        look = {"length": _number(length[row]), "color": COLORS[role]}
-        types.append(
-            element(
-                "vType",
-                {"id": role, **look, "minGap": "0", "sigma": "0", "speedDev": "0"},
-                *(element("param", {"key": key, "value": value}) for key, value in parameters.items()),
-            )
-        )
+        parameters = {ROLE: role} | ({MERGE_POSITION: number(merge_position)} if role == "merging" else {})
+        kind = replace(CONTROLLED, id=role, length=float(length[row]), color=COLORS[role], parameters=parameters)
+        types.append(kind.element())
         start = {
             "departLane": str(where.lane),
-            "departPos": _number(where.position),
-            "departSpeed": _number(speed[row]),
+            "departPos": number(where.position),
+            "departSpeed": number(speed[row]),
         }
         cars.append(
             element(
@@ -78,20 +67,3 @@ def configuration(inputs: Options, processing: Options, with_view: bool, time: O
     }
     parts = [element(part, {}, *(element(k, {"value": v}) for k, v in of.items())) for part, of in options.items()]
     return element("configuration", {}, *parts)
-
-
-def element(tag: str, attributes: dict[str, str], *children: etree._Element) -> etree._Element:
-    """An XML element with its children."""
-    element = etree.Element(tag, attributes)
-    element.extend(children)
-    return element
-
-
-def _number(value: float) -> str:
-    """A number as XML text, without loss."""
-    return repr(float(value))
-
-
-def write_xml(path: Path, root: etree._Element) -> None:
-    """Write an XML file."""
-    path.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))

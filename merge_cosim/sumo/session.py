@@ -9,9 +9,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from merge_cosim.sumo.modes import LaneChangeMode, SpeedMode
+from merge_cosim.sumo.vehicle_types import CONTROLLED
 
 SPEED_OF_SUMO = -1.0
 """The commanded speed that gives a vehicle back to its car-following model."""
+_SETTERS = {"minGap": "setMinGap", "sigma": "setImperfection", "speedDev": "setSpeedDeviation"}
+"""By the attributes of a type, what sets them in a running SUMO."""
 _VIEW, _ZOOM = "View #0", 1500.0
 
 Errors = tuple[type[Exception], ...]
@@ -134,14 +137,13 @@ class Session:
         Raises:
             RuntimeError: SUMO did not insert them.
         """
-        types = self._api.vehicletype
-        types.copy("DEFAULT_VEHTYPE", "controlled")
-        types.setImperfection("controlled", 0.0)
-        types.setSpeedDeviation("controlled", 0.0)
-        types.setMinGap("controlled", 0.0)
+        types, kind = self._api.vehicletype, CONTROLLED.id
+        types.copy("DEFAULT_VEHTYPE", kind)
+        for name, value in CONTROLLED.attributes.items():
+            getattr(types, _SETTERS[name])(kind, value)
         cars = list(cars)
         for car in cars:
-            self.insert(car.name, car.route, "controlled", departLane="free", departSpeed="0")
+            self.insert(car.name, car.route, kind, departLane="free", departSpeed="0")
             self.set_color(car.name, car.color)
             self.set_speed(car.name, 0.0)
         self.step()

@@ -30,7 +30,7 @@ from merge_cosim.scenarios.scenario import Scenario, load_scenario
 from merge_cosim.scenarios.settings import split_settings
 from merge_cosim.scenarios.sources import Routes, Traffic
 from merge_cosim.sumo.configuration import Configuration
-from merge_cosim.sumo.routes import ROLE
+from merge_cosim.sumo.vehicle_types import ROLE
 from merge_cosim.sweeps.full_scene_task import SceneReplay, load_scenes
 from merge_cosim.sweeps.scene_task import SceneBatch
 from merge_cosim.sweeps.task import Batch, Task

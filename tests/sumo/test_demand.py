@@ -17,7 +17,7 @@ def test_flows_have_the_demand_asked_for(tmp_path):
     assert set(found) == {"through", "merging", "host"}
     assert found["through"].get("period") == "exp(1.0)"
     assert found["merging"].get("period") == "5.0"
-    assert found["host"].get("begin") == "30"
+    assert float(found["host"].get("begin")) == 30.0
     assert found["host"].get("departLane") == "0"
     assert found["merging"].find("route").get("edges") == "ramp weave main_out"
     types = list(etree.parse(tmp_path / "traffic.rou.xml").getroot().iter("vType"))

@@ -7,7 +7,8 @@ from lxml import etree
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.sumo.routes import ROLE, write_encounter
+from merge_cosim.sumo.routes import write_encounter
+from merge_cosim.sumo.vehicle_types import ROLE
 
 
 def one_encounter(merge_position: float) -> Encounters:

@@ -4,23 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True)
-class Drivers:
-    """A share of the drivers, in the terms of SUMO's model EIDM (Salles, Kaufmann, Reuss 2020).
-
-    Attributes:
-        share: Their share of the traffic.
-        length: Length of their cars [m].
-        tau: Time gap that they keep [s].
-        accel, decel: Comfortable acceleration and deceleration [m/s^2].
-    """
-
-    share: float
-    length: float
-    tau: float
-    accel: float
-    decel: float
+from merge_cosim.sumo.vehicle_types import DRIVERS, Drivers
 
 
 @dataclass(frozen=True)
@@ -45,10 +29,10 @@ class Recipe:
         filmed_from: The on-ramp is filmed from here on [m past the gore].
         speed_factor: Spread of desired speeds: normal, mean, deviation, lowest, highest (as a factor of the limit).
         min_gap: Gap to the car ahead at standstill [m].
-        assertive: How small a gap a driver takes when he must change lane (`lcAssertive`).
-        strategic: How early he wants to change (`lcStrategic`).
-        cooperative: How willing he is to make room (`lcCooperative`), 0 to 1.
-        speed_gain: How eager he is to change for a faster lane (`lcSpeedGain`).
+        assertive: How small a gap a driver takes who must change lane (`lcAssertive`).
+        strategic: How early the driver wants to change (`lcStrategic`).
+        cooperative: How willing the driver is to make room (`lcCooperative`), 0 to 1.
+        speed_gain: How eager the driver is to change for a faster lane (`lcSpeedGain`).
         change_time: Length of a lane change [s]; the car counts for the new lane from its middle on.
         drivers: The kinds of drivers.
     """
@@ -76,15 +60,6 @@ class Recipe:
     change_time: float
     drivers: tuple[Drivers, ...]
 
-
-DRIVERS = (
-    Drivers(share=0.40, length=4.7, tau=0.5, accel=2.2, decel=3.0),
-    Drivers(share=0.30, length=5.2, tau=0.7, accel=1.8, decel=2.5),
-    Drivers(share=0.27, length=4.4, tau=0.35, accel=2.5, decel=3.0),
-    Drivers(share=0.03, length=14.0, tau=1.0, accel=1.0, decel=2.0),
-)
-"""Usual, careful and hurried drivers, and trucks. Their time gaps are shorter than drivers say they keep: so are the
-gaps in NGSIM's dense traffic, and SUMO's cars keep theirs more strictly than people do."""
 
 RECIPES = {
     "us101": Recipe(

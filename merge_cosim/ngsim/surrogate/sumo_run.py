@@ -6,11 +6,12 @@ from pathlib import Path
 
 from lxml import etree
 
-from merge_cosim.core.units import HOUR
 from merge_cosim.ngsim.surrogate.recipe import Recipe
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.sumo.options import BACKGROUND, SumoOptions, words
 from merge_cosim.sumo.start import run_sumo
+from merge_cosim.sumo.vehicle_types import distribution
+from merge_cosim.sumo.xml import element, flow, number, speed_sign, write_xml
 
 _FILES = {"routes": "rou.xml", "signs": "add.xml", "edges": "txt", "fcd": "parquet"}
 
@@ -36,8 +37,8 @@ def simulate(recipe: Recipe, ramp: Ramp, seed: int, end: float, folder: Path) ->
     """
     lanes = _lanes(ramp)
     files = {name: folder / f"{name}.{kind}" for name, kind in _FILES.items()}
-    _write(files["routes"], _routes(recipe, ramp, end + RUN_OUT))
-    _write(files["signs"], _signs(recipe, ramp, lanes))
+    write_xml(files["routes"], _routes(recipe, ramp, end + RUN_OUT))
+    write_xml(files["signs"], _signs(recipe, ramp, lanes))
     files["edges"].write_text("".join(f"edge:{edge}\n" for edge in lanes))
     options = {
         "route-files": files["routes"],
@@ -65,62 +66,40 @@ def _lanes(ramp: Ramp) -> dict[str, list[str]]:
 
 def _routes(recipe: Recipe, ramp: Ramp, end: float) -> etree._Element:
     """Drivers and demand; cars leave the main road at `end` [m past the gore]."""
-    root = etree.Element("routes")
-    kinds = etree.SubElement(root, "vTypeDistribution", id="drivers")
-    for number, kind in enumerate(recipe.drivers):
-        etree.SubElement(
-            kinds,
-            "vType",
-            id=f"drivers-{number}",
-            carFollowModel="EIDM",
-            probability=repr(kind.share),
-            length=repr(kind.length),
-            tau=repr(kind.tau),
-            accel=repr(kind.accel),
-            decel=repr(kind.decel),
-            minGap=repr(recipe.min_gap),
-            speedFactor="normc({},{},{},{})".format(*recipe.speed_factor),
-            lcAssertive=repr(recipe.assertive),
-            lcStrategic=repr(recipe.strategic),
-            lcCooperative=repr(recipe.cooperative),
-            lcSpeedGain=repr(recipe.speed_gain),
-            lcKeepRight="0",
-        )
+    kinds = distribution(
+        "drivers",
+        recipe.drivers,
+        car_following="EIDM",
+        min_gap=recipe.min_gap,
+        speed_factor="normc({},{},{},{})".format(*recipe.speed_factor),
+        assertive=recipe.assertive,
+        strategic=recipe.strategic,
+        cooperative=recipe.cooperative,
+        speed_gain=recipe.speed_gain,
+        keep_right=0.0,
+    )
+    root = element("routes", {}, kinds)
     last = ramp.main[-1]
     exits = [edge for edge in _lanes(ramp) if edge not in (*ramp.main_route, *ramp.ramp_route)]
     shared = ramp.ramp[-1].edge
-    leave = {"arrivalPos": repr(end - last.start)}
+    leave = {"arrivalPos": number(end - last.start)}
     flows = {
         "through": (recipe.through, ramp.main_route, {"departLane": "random", **leave}),
         "leaving": (recipe.leaving, (*ramp.main_route[: ramp.main_route.index(shared) + 1], *exits), {}),
         "merging": (recipe.merging, ramp.ramp_route, leave),
     }
+    until = recipe.warm_up + recipe.duration
     for name, (per_hour, route, how) in flows.items():
-        if not per_hour:
-            continue
-        apart = HOUR / per_hour
-        flow = etree.SubElement(
-            root,
-            "flow",
-            {"departLane": "first", "departSpeed": "avg", **how},
-            id=name,
-            type="drivers",
-            begin="0",
-            end=repr(recipe.warm_up + recipe.duration),
-            period=repr(apart) if name == "merging" else f"exp({1 / apart!r})",
-        )
-        etree.SubElement(flow, "route", edges=" ".join(route))
+        if per_hour:
+            how = {"departLane": "first", **how}
+            root.append(flow(name, "drivers", route, per_hour, name == "merging", 0.0, until, **how))
     return root
 
 
 def _signs(recipe: Recipe, ramp: Ramp, lanes: dict[str, list[str]]) -> etree._Element:
     """Speed signs in place of the net's speed limits."""
-    root = etree.Element("additional")
-    for edge, along in lanes.items():
-        for lane in along:
-            sign = etree.SubElement(root, "variableSpeedSign", id=lane, lanes=lane)
-            etree.SubElement(sign, "step", time="0", speed=repr(_limit(recipe, ramp, edge, lane)))
-    return root
+    signs = (speed_sign(lane, [(0.0, _limit(recipe, ramp, edge, lane))]) for edge in lanes for lane in lanes[edge])
+    return element("additional", {}, *signs)
 
 
 def _limit(recipe: Recipe, ramp: Ramp, edge: str, lane: str) -> float:
@@ -133,7 +112,3 @@ def _limit(recipe: Recipe, ramp: Ramp, edge: str, lane: str) -> float:
     if start < 0.0:
         return recipe.approach_speed
     return recipe.beside_speed if start < ramp.auxiliary_end else recipe.onward_speed
-
-
-def _write(path: Path, root: etree._Element) -> None:
-    path.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))

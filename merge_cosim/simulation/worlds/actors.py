@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from merge_cosim.scoring.tracks import DECIMALS
 from merge_cosim.sumo.lanes import Part, RampLane, RampLanes
-from merge_cosim.sumo.routes import ROLE
 from merge_cosim.sumo.session import Session
+from merge_cosim.sumo.vehicle_types import ROLE
 
 
 @dataclass
