@@ -143,7 +143,7 @@ def test_before_the_take_over_the_host_is_the_human() -> None:
     cars = (HOST, MERGING, LEADER, *FOLLOWERS)
     among = batches(*cars, method="always-yield", take_over=1000.0)[1]
     human = batches(*cars, method="human")[1]
-    decided = ("method", "decision_flips", "correct_at_merge", "first_stable_s", "sumo_collision")
+    decided = ("method", "world", "decision_flips", "correct_at_merge", "first_stable_s", "sumo_collision")
     beliefs = tuple(name for name in row_of(human) if name.startswith(("log_odds", "arrival_lead")))
     row = row_of(among)
     assert_same(row_of(human), row, leave_out=(*decided, *beliefs))
