@@ -1,6 +1,7 @@
 """`merge-cosim methods`, `scenarios` and `cache`: what there is."""
 
-from typing import Annotated
+from textwrap import wrap
+from typing import Annotated, Any
 
 import typer
 
@@ -9,12 +10,28 @@ from merge_cosim.cli.show import print_json, show_table
 
 app = typer.Typer()
 
+WIDTH = 80
+"""Columns of a description."""
+
 
 @app.command()
-def methods(plugin: Plugins = None, json: Json = False) -> None:
-    """List estimators, controllers and merging cars with their parameters."""
-    from merge_cosim.scenarios.catalogue import components
+def methods(
+    name: Annotated[
+        str | None, typer.Argument(help="Component or method to describe, such as acc, pgm+lqr or designed.")
+    ] = None,
+    plugin: Plugins = None,
+    json: Json = False,
+) -> None:
+    """List estimators, controllers and merging cars, or describe the parameters of one."""
+    from merge_cosim.scenarios.catalogue import component, components
 
+    if name is not None:
+        found = component(name, plugin or ())
+        if json:
+            print_json(found)
+        else:
+            typer.echo("\n\n".join(map(_description, found)))
+        return
     rows = components(plugin or ())
     if json:
         print_json(rows)
@@ -62,3 +79,26 @@ def cache(clear: Annotated[bool, typer.Option("--clear", help="Delete it.")] = F
 def _listed(row: dict[str, object]) -> str:
     values = row["parameters"]
     return ", ".join(f"{key}={value}" for key, value in values.items()) if isinstance(values, dict) else ""
+
+
+def _description(part: dict[str, Any]) -> str:
+    """A component and its parameters, in lines that fit a terminal of 80 columns."""
+    rows = [
+        [row["name"], "-" if row["default"] is None else str(row["default"]), row["unit"], row["bounds"]]
+        for row in part["parameters"]
+    ]
+    lines = [f"{part['role']} {part['name']}", ""]
+    lines += ["\n".join(wrap(text, WIDTH, break_on_hyphens=False)) + "\n" for text in part["about"].split("\n\n")]
+    if controller := part.get("controller"):
+        lines.append(
+            f"It drives with the controller {controller}, unless another is named: {part['name']}+CONTROLLER.\n"
+        )
+    if not rows:
+        return "\n".join([*lines, "No parameters."])
+    head = ["parameter", "default", "unit", "bounds"]
+    widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
+    for row, meaning in zip((head, *rows), ["", *(row["meaning"] for row in part["parameters"])], strict=True):
+        lines.append("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())
+        lines += wrap(meaning, WIDTH, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
+    owner = "merging" if part["role"] == "merging car" else part["name"]
+    return "\n".join([*lines, "", f"Set one with --set {owner}.PARAMETER=VALUE."])

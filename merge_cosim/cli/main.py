@@ -7,15 +7,30 @@ from typing import Annotated, Literal, cast
 
 import typer
 
+from merge_cosim import __doc__ as about
+from merge_cosim import __version__
 from merge_cosim.cli import lists, ngsim, ramp, results
-from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Model, Plugins, Seed, Sets
+from merge_cosim.cli.options import (
+    Against,
+    Data,
+    ForceSource,
+    Jobs,
+    Json,
+    Methods,
+    Model,
+    Plugins,
+    Scenario,
+    Seed,
+    Sets,
+    methods_like,
+    scenarios_like,
+)
 from merge_cosim.cli.show import die, print_json, show_table
 from merge_cosim.core.errors import UserError
 
 app = typer.Typer(
-    help=__import__("merge_cosim").__doc__,
+    help=about,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -43,12 +58,30 @@ USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 Start = Literal["spawn", "fork"]
 
 
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"merge-cosim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Options of the command itself."""
+
+
 @app.command()
 def sweep(
-    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios or scenario files.")],
-    method: Annotated[
-        list[str] | None, typer.Option(help="Estimator, or estimator+controller; all if not given.")
-    ] = None,
+    scenarios: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="SCENARIO...", help="Shipped scenarios or scenario files.", autocompletion=scenarios_like
+        ),
+    ],
+    method: Methods = None,
     model: Model = None,
     set_: Sets = None,
     vary: Annotated[list[str] | None, typer.Option(help="NAME=A:B:STEP or NAME=X,Y,Z; one at a time.")] = None,
@@ -108,9 +141,9 @@ def sweep(
 
 @app.command()
 def run(
-    scenario: Annotated[str, typer.Argument(help="Shipped scenario or scenario file.")],
+    scenario: Scenario,
     case: Annotated[str, typer.Option(help="Case, as in the column 'case' of results.parquet.")],
-    method: Annotated[str, typer.Option(help="Estimator, or estimator+controller.")],
+    method: Annotated[str, typer.Option(help="Estimator, or estimator+controller.", autocompletion=methods_like)],
     model: Model = None,
     set_: Sets = None,
     data: Data = None,
@@ -160,7 +193,7 @@ def run(
 
 @app.command()
 def export(
-    scenario: Annotated[str, typer.Argument(help="Shipped scenario or scenario file.")],
+    scenario: Scenario,
     case: Annotated[str, typer.Option(help="Case, as in the column 'case' of results.parquet.")],
     out: Annotated[Path, typer.Option(help="Folder to write to.")],
     commonroad: Annotated[bool, typer.Option("--commonroad", help="Write a CommonRoad scenario instead.")] = False,

@@ -1,12 +1,46 @@
 """Options that several commands share."""
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+
+def _names(values: list[str] | None) -> list[str] | None:
+    """The parts of comma lists, in their order."""
+    return [name.strip() for value in values for name in value.split(",")] if values else values
+
+
+def scenarios_like(incomplete: str) -> list[str]:
+    """Shipped scenarios that begin so; for completion in a shell."""
+    from merge_cosim.scenarios.scenario import scenario_names
+
+    return [name for name in scenario_names() if name.startswith(incomplete)]
+
+
+def methods_like(incomplete: str) -> list[str]:
+    """Methods whose last name in `a,b+c` begins so; for completion in a shell."""
+    from merge_cosim.controllers.base import controllers
+    from merge_cosim.scenarios.methods import default_methods
+
+    last = re.split("[,+]", incomplete)[-1]
+    before = incomplete[: len(incomplete) - len(last)]
+    names = controllers.names() if before.endswith("+") else default_methods()
+    return [before + name for name in names if name.startswith(last)]
+
+
 Source = Literal["ngsim", "surrogate"]
 Data = Annotated[Path | None, typer.Option(help="Folder with NGSIM files (else $MERGE_COSIM_DATA, else ./data).")]
+Scenario = Annotated[str, typer.Argument(help="Shipped scenario or scenario file.", autocompletion=scenarios_like)]
+Methods = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Estimator, or estimator+controller; several as a,b,c or by repetition; all if not given.",
+        callback=_names,
+        autocompletion=methods_like,
+    ),
+]
 Model = Annotated[str | None, typer.Option(help="Model file, or name of a model that comes with the project.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, such as acc.headway=1.2 or test.horizon=5.")]
 Plugins = Annotated[list[Path] | None, typer.Option(help="Python file with components of your own.")]

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from pydantic import NonPositiveFloat
 
 from merge_cosim.controllers.base import Controller, controllers
 from merge_cosim.core.observation import Observation
-from merge_cosim.core.units import BoolArray, FloatArray
+from merge_cosim.core.units import BoolArray, Braking, FloatArray
 
 
 @controllers.register
@@ -21,7 +20,7 @@ class Brake(Controller):
     """
 
     name: ClassVar[str] = "brake"
-    min_acceleration: NonPositiveFloat = -4.0
+    min_acceleration: Braking = -4.0
 
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """The same full braking everywhere."""

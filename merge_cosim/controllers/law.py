@@ -4,9 +4,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import NonNegativeFloat, NonPositiveFloat, PositiveFloat
+from pydantic import NonNegativeFloat, PositiveFloat
 
-from merge_cosim.core.units import BoolArray, FloatArray
+from merge_cosim.core.units import Acceleration, BoolArray, Braking, FloatArray
 
 
 @dataclass(kw_only=True)
@@ -20,8 +20,8 @@ class FreeDriving:
     """
 
     k_free: PositiveFloat = 0.4
-    min_acceleration: NonPositiveFloat = -4.0
-    max_acceleration: PositiveFloat = 2.0
+    min_acceleration: Braking = -4.0
+    max_acceleration: Acceleration = 2.0
 
     def free(self, speed: FloatArray, speed_limit: float) -> FloatArray:
         """Acceleration [m/s^2] without a car ahead, before the bounds."""

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from merge_cosim.controllers.acc import Acc
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.encounter import Intention
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.registry import parameters
-from merge_cosim.core.units import TOLERANCE, BoolArray, FloatArray
+from merge_cosim.core.units import TOLERANCE, BoolArray, Count, FloatArray
 from merge_cosim.estimators.base import Estimator
 from merge_cosim.estimators.intended import IntendedAcceleration
 
@@ -40,14 +40,17 @@ class Pcb(IntendedAcceleration, Acc):
         candidate_step: Step between the candidates [m/s^2].
         steps: Number of steps predicted.
         step: Length of a step [s].
-        progress, comfort, closeness, overlap: Weights of the cost's terms.
+        progress: Weight of lost speed.
+        comfort: Weight of discomfort.
+        closeness: Weight of closeness.
+        overlap: Weight of an overlap.
         comfort_scale: Acceleration at which discomfort is 1 [m/s^2].
         gap_scale: Gap at which closeness has fallen to 1/e [m].
     """
 
     name: ClassVar[str] = "pcb"
-    candidate_step: PositiveFloat = 0.5
-    steps: PositiveInt = 12
+    candidate_step: Annotated[float, Field(ge=0.01)] = 0.5
+    steps: Count = 12
     step: PositiveFloat = 0.5
     progress: NonNegativeFloat = 1.0
     comfort: NonNegativeFloat = 0.1
@@ -93,7 +96,7 @@ class Pcb(IntendedAcceleration, Acc):
         host *= self.step
         host += seen.host_station
         merging = self._merging_stations(seen)
-        # upstream of the merging point nobody can be close: such steps are put out of each other's reach
+        # upstream of the merging point no car can be close: such steps are put out of each other's reach
         host[host < -TOLERANCE] = -np.inf
         merging[merging < -TOLERANCE] = np.inf
         # gap = |middle of the one - middle of the other| - half of both lengths

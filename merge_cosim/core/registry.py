@@ -11,16 +11,19 @@ import re
 import sys
 from abc import ABC
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar, dataclass_transform
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, PydanticInvalidForJsonSchema, TypeAdapter, ValidationError
 
 from merge_cosim.core.errors import UserError
+
+LARGEST = 1e9
+"""Largest number that a parameter can be: beyond it a sum in double precision is coarser than `units.TOLERANCE`."""
 
 C = TypeVar("C", bound="Component")
 
@@ -127,8 +130,47 @@ def did_you_mean(name: str, choices: Mapping[str, Any] | list[str]) -> str:
 
 
 def parameters(cls: type) -> dict[str, Any]:
-    """Names and defaults of a component's parameters: its dataclass fields."""
-    return {f.name: f.default for f in fields(cls) if f.init}
+    """Names and defaults of a component's parameters: its dataclass fields. `MISSING` stands for no default."""
+    return {f.name: f.default if f.default_factory is MISSING else f.default_factory() for f in fields(cls) if f.init}
+
+
+def described(cls: type) -> list[dict[str, Any]]:
+    """Return name, default, unit, bounds and meaning of each of a component's parameters.
+
+    The unit is the first `[unit]` of the meaning in the docstring, the bounds are those of the type hint.
+    """
+    try:
+        schema = _adapter(cls).json_schema()["properties"]
+    except PydanticInvalidForJsonSchema:  # a user's own type of parameter, whose bounds are not known
+        schema = {}
+    rows = []
+    for name, meaning in meanings(cls).items():
+        unit = re.search(r" \[([^\]]+)\]", meaning)
+        default = parameters(cls)[name]
+        rows.append(
+            {
+                "name": name,
+                "default": None if default is MISSING else default,
+                "unit": unit[1] if unit else "",
+                "bounds": _bounds(schema.get(name, {})),
+                "meaning": meaning.replace(unit[0], "", 1) if unit else meaning,
+            }
+        )
+    return rows
+
+
+def _bounds(schema: Mapping[str, Any]) -> str:
+    """The values that a JSON schema allows, in words."""
+    if "enum" in schema:
+        return ", ".join(map(str, schema["enum"]))
+    if schema.get("type") == "boolean":
+        return "true, false"
+    limits = [
+        f"{sign} {schema[key]:g}"
+        for key, sign in (("exclusiveMinimum", ">"), ("minimum", ">="), ("exclusiveMaximum", "<"), ("maximum", "<="))
+        if key in schema
+    ]
+    return ", ".join((["whole"] if schema.get("type") == "integer" else []) + limits)
 
 
 def meanings(cls: type) -> dict[str, str]:
@@ -165,8 +207,11 @@ def validated(cls: type[C], values: Mapping[str, Any], where: str) -> C:
         first = error.errors()[0]
         raise UserError(f"{where}: {'.'.join(map(str, first['loc']))} = {first['input']!r}: {first['msg']}") from None
     for key, value in values.items():
-        if isinstance(value, bool | str) and type(getattr(made, key)) in (int, float):
+        taken = getattr(made, key)
+        if isinstance(value, bool | str) and type(taken) in (int, float):
             raise UserError(f"{where}: {key} = {value!r}: Input should be a number")
+        if isinstance(taken, float) and abs(taken) > LARGEST:
+            raise UserError(f"{where}: {key} = {value!r}: Input should be between -{LARGEST:g} and {LARGEST:g}")
     return made
 
 

@@ -29,6 +29,15 @@ AnyArray = NDArray[Any]
 Share = Annotated[float, Field(ge=0, le=1)]
 """A parameter that is a share of a whole."""
 
+Braking = Annotated[float, Field(ge=-100, le=0)]
+"""A parameter that is a car's hardest braking [m/s^2], negative."""
+
+Acceleration = Annotated[float, Field(gt=0, le=100)]
+"""A parameter that is a car's hardest acceleration [m/s^2]."""
+
+Count = Annotated[int, Field(ge=1, le=10_000)]
+"""A parameter that is a number of things kept for each encounter of a batch; more would fill the memory."""
+
 
 def time_to_arrival(station: FloatArray, speed: FloatArray) -> FloatArray:
     """Time [s] to reach station 0 at the present speed: `max(-s, 0) / max(v, 0.5)`."""

@@ -7,11 +7,11 @@ from enum import IntEnum
 from typing import ClassVar
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import Keys
-from merge_cosim.core.units import TOLERANCE, FloatArray, IntArray, Share
+from merge_cosim.core.units import TOLERANCE, Count, FloatArray, IntArray, Share
 from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.estimators.particles import Cloud, Dice, low_variance
@@ -73,7 +73,8 @@ class DbnPf(Estimator):
         k_free: Gain of free driving [1/s].
         min_acceleration, max_acceleration: Bounds of the mean acceleration [m/s^2].
         acceleration_noise: Its standard deviation [m/s^2].
-        sigma_station, sigma_speed: Standard deviations of what is observed [m, m/s].
+        sigma_station: Standard deviation of the observed station [m].
+        sigma_speed: Standard deviation of the observed speed [m/s].
         start_yield, start_not_yield: Shares of the maneuvers at the start; the rest ignores.
         change_rate: Rate at which a driver changes his maneuver, to either other one alike [1/s].
         redrawn: Share of the particles drawn anew at the observation, maneuvers by the present belief.
@@ -81,7 +82,7 @@ class DbnPf(Estimator):
 
     name: ClassVar[str] = "dbn-pf"
     needs_model: ClassVar[bool] = True
-    particles: PositiveInt = 200
+    particles: Count = 200
     interval: PositiveFloat = 0.5
     pad: NonNegativeFloat = 2.0
     min_arrival: PositiveFloat = 0.5

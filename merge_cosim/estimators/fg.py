@@ -8,11 +8,11 @@ from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import Keys
-from merge_cosim.core.units import FloatArray, IntArray, Share
+from merge_cosim.core.units import Count, FloatArray, IntArray, Share
 from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.estimators.evidence import LogRatio, SpeedEvidence
 from merge_cosim.estimators.learned.histogram import time_bin
@@ -36,13 +36,13 @@ class FactorGraph(Estimator):
     """
 
     needs_model: ClassVar[bool] = True
-    frames: PositiveInt = 20
+    frames: Count = 20
     forgetting: NonNegativeFloat = 0.1
     last_weight: NonNegativeFloat = 1.0
     last_variance: PositiveFloat = 1.0
     time_weight: NonNegativeFloat = 0.0
     uniform: Share = 0.05
-    transition_lag: PositiveInt = 1
+    transition_lag: Count = 1
 
     @abstractmethod
     def _log_ratio(self, model: IntentionModel) -> LogRatio:

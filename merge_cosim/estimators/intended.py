@@ -15,12 +15,14 @@ class IntendedAcceleration:
     """Mean acceleration of the merging car for each intention (after Wei, Dolan, Litkouhi 2013).
 
     Attributes:
-        means: `fixed`: the same two accelerations everywhere. `arrival`: what brings him to the merging point `tau`
+        means: `fixed`: the same two accelerations everywhere. `arrival`: what brings the car to the merging point `tau`
             after (YIELD) or before (NOT_YIELD) a host that keeps its speed, `a_I = 2 (d - v T_I) / T_I^2`; where that
-            would have him stop short and roll back, braking to a stop at the merging point, `-v^2 / (2 d)`.
-        mean_yield, mean_not_yield: The fixed means [m/s^2].
+            would have it stop short and roll back, braking to a stop at the merging point, `-v^2 / (2 d)`.
+        mean_yield: Fixed mean of a driver that yields [m/s^2].
+        mean_not_yield: Fixed mean of a driver that does not yield [m/s^2].
         tau: Time between the two arrivals [s].
-        merging_min_acceleration, merging_max_acceleration: Bounds of the means by arrival [m/s^2].
+        merging_min_acceleration: Lower bound of the means by arrival [m/s^2].
+        merging_max_acceleration: Upper bound of the means by arrival [m/s^2].
     """
 
     means: Literal["fixed", "arrival"] = "fixed"

@@ -6,11 +6,11 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pydantic import NonNegativeFloat, PositiveInt
+from pydantic import NonNegativeFloat
 
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import Keys
-from merge_cosim.core.units import FloatArray, IntArray, Share
+from merge_cosim.core.units import Count, FloatArray, IntArray, Share
 from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.estimators.evidence import LogRatio, SpeedEvidence
 from merge_cosim.estimators.learned.histogram import time_bin
@@ -32,10 +32,10 @@ class GraphicalModel(Estimator):
     """
 
     needs_model: ClassVar[bool] = True
-    nodes: PositiveInt = 52
+    nodes: Count = 52
     alpha: NonNegativeFloat = 1.0
     time_weight: NonNegativeFloat = 1.0
-    transition_lag: PositiveInt = 1
+    transition_lag: Count = 1
     uniform: Share = 0.05
 
     @abstractmethod
@@ -92,7 +92,7 @@ class PgmTime(Pgm):
     """PGM without its speed term: time and prior only (ablation)."""
 
     name: ClassVar[str] = "pgm-time"
-    nodes: PositiveInt = 1
+    nodes: Count = 1
 
 
 @estimators.register

@@ -1,12 +1,13 @@
 """Registries: names are unique, and parameters are checked."""
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar, Literal
 
 import pytest
+from pydantic import Field
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.registry import Component, Registry
+from merge_cosim.core.registry import Component, Registry, described
 
 
 def parts() -> Registry[Component]:
@@ -48,3 +49,52 @@ def test_parameters_are_converted_and_checked() -> None:
             registry.build("one", values, "here")
     with pytest.raises(UserError, match=r"unknown part 'on'; did you mean 'one'"):
         registry["on"]
+
+
+def test_a_plain_class_becomes_a_part_under_its_own_name() -> None:
+    registry = parts()
+
+    @registry.register
+    class TwoWordsHTTPPart(Component):
+        size: float = 1.0
+
+    assert registry.build("two-words-http-part", {"size": 2}, "here").size == 2.0
+    assert TwoWordsHTTPPart(size=3.0).size == 3.0
+
+    class Larger(TwoWordsHTTPPart):  # not registered: a dataclass once it is made
+        room: float = 5.0
+
+    assert vars(Larger(size=3.0, room=4.0)) == {"size": 3.0, "room": 4.0}
+    assert Larger.name == "larger"
+    with pytest.raises(UserError, match=r"the name 'a\.b' must be of letters"):
+        registry.register(type("Dotted", (Component,), {"name": "a.b"}))
+
+
+def test_parameters_are_described() -> None:
+    class Described(Component):
+        """A part.
+
+        Attributes:
+            size: Its size [m], as a whole [cm].
+            share: A share.
+            kind: Which.
+            parts: Some.
+        """
+
+        size: Annotated[int, Field(gt=0)]
+        share: Annotated[float, Field(ge=0, lt=1)] = 0.5
+        kind: Literal["a", "b"] = "a"
+        parts: list[int] = field(default_factory=lambda: [1])
+        on: bool = True
+
+    rows = {row.pop("name"): row for row in described(parts().register(Described))}
+    assert rows["size"] == {
+        "default": None,
+        "unit": "m",
+        "bounds": "whole, > 0",
+        "meaning": "Its size, as a whole [cm].",
+    }
+    assert rows["share"] == {"default": 0.5, "unit": "", "bounds": ">= 0, < 1", "meaning": "A share."}
+    assert rows["kind"]["bounds"] == "a, b"
+    assert (rows["parts"]["default"], rows["parts"]["bounds"]) == ([1], "")
+    assert rows["on"] == {"default": True, "unit": "", "bounds": "true, false", "meaning": ""}
