@@ -142,7 +142,7 @@ def section(name: str, data: Path, docs: Path) -> str:
         f"## {TITLES[name]}",
         f"Lane widths beside the auxiliary lane, from the left: {widths} m. {ties(name, ramp, plan)}",
         f"![Lanes of {TITLES[name]} with logged positions](img/geometry-{name}.png)",
-        "Distance of logged positions from our lane's centre [m]. 'Odd' are the cars that nothing was fitted to; 'rows "
+        "Distance of logged positions from our lane's centre [m]. 'Odd' are the cars that were not used in any fit; 'rows "
         "only' is the alignment without any fit to trajectories, for all cars:",
         residuals(ramp, plan, cars),
         "Distance of the drawn centre lines from our lanes' centres [m], where they are drawn:",
@@ -151,8 +151,8 @@ def section(name: str, data: Path, docs: Path) -> str:
     if plan.corrections:
         parts += [
             corrections(plan),
-            "How well trajectories alone place Local_Y along the road: the shift with which lanes 7 and 8 fit best to "
-            "the drawn line, a shift sideways left free:",
+            "How well trajectories determine the position of Local_Y along the road: the shift with which lanes 7 and 8 fit best to "
+            "the drawn line, with a free lateral shift:",
             along_road(plan, drawn[DRAWN[name][6]], cars),
         ]
     return "\n\n".join(parts)
@@ -175,20 +175,20 @@ HEAD = """\
 # The geometry of US-101 and I-80
 
 Both nets are true to scale and georeferenced: lane counts and widths, the curve of the road, on-ramp, off-ramp,
-gore, auxiliary lane (US-101) and acceleration lane (I-80). Their plain XML in `sumo_nets/` is written by
+gore, auxiliary lane (US-101) and acceleration lane (I-80). The plain XML in `sumo_nets/` is written by
 
     python tools/ramp_geometry.py --data DIR       # DIR/geometry/ and NGSIM's trajectories; writes and builds both
     python tools/geometry_page.py --data DIR       # this page
 
-and needs no survey file to be built again (`merge-cosim ramp build us101`). `merge-cosim ramp edit us101` opens it
-in netedit; `view.xml` in each folder colours the lanes by what they are for.
+To build a net again (`merge-cosim ramp build us101`) no survey file is needed. `merge-cosim ramp edit us101` opens it
+in netedit; `view.xml` in each folder colours the lanes by their role.
 
 ## Sources
 
 - Lane centre lines and road boundaries: NGSIM.jl (MIT), traced from NGSIM's CAD drawings, in feet of the California
   state plane, NAD83 (US-101: zone V, EPSG:2229; I-80: zone III, EPSG:2227).
 - Trajectories: the fragments of NGSIM that the data folder holds; of I-80 single cars, which is enough for
-  geometry.
+  the geometry.
 - One place in both coordinates: the first two rows of NGSIM's own files `trajectories-0750am-0805am.txt` (US-101)
   and `trajectories-0400-0415.txt` (I-80), as many tutorials print them: Local_X, Local_Y with Global_X, Global_Y.
 
@@ -197,8 +197,8 @@ in netedit; `view.xml` in each folder colours the lanes by what they are for.
 - **Plane.** Feet are US survey feet (1200/3937 m). The nets are in metres of EPSG:26945 (zone V) and EPSG:26943
   (zone III), shifted so that (0, 0) is the host lane's axis at the gore; `<location>` says by how much, so that
   netedit and sumo-gui can lay a map behind the net.
-- **Main road.** One axis: the mean of the drawn centre lines, less each lane's place across the road, averaged over
-  30 m, because the tracing wobbles by some 0.15 m. Lane widths are the mean distances of the painted boundaries.
+- **Main road.** One axis: the mean of the drawn centre lines, each shifted by its lane's position across the road,
+  averaged over 30 m, because the tracing varies by about 0.15 m. Lane widths are the mean distances of the painted boundaries.
   Corners that change the shape by less than 2 cm are left out.
 - **Along the road.** x = Local_Y - Local_Y of the gore is arc length along that axis, with the offset that the
   published rows give. SUMO's edge lengths are set to it, so every station is exact.
@@ -218,23 +218,23 @@ TAIL = """\
 ## Weaknesses
 
 - The alignment along the road rests on two published rows at the upstream end; an error in NGSIM's scale would show
-  at the other end. Sideways, positions wander by up to a metre along the road together in all lanes, which is
-  NGSIM's cameras, not the road: that, and how people drive, is most of the residual.
+  at the other end. The lateral positions of all lanes together vary by up to a metre along the road, an error
+  of NGSIM's cameras. That, and how people drive, is most of the residual.
 - **Lane 6 of US-101**: merging cars keep to the left of it. They are part of the mean that sets Local_X, so lanes 1
-  to 5 are left with a small shift the other way. That lane 6 counts in this mean was settled after the alternative
-  had been seen: with lanes 1 to 5 alone its median is 0.63 m. The column 'rows only' rests on no such choice.
-- Around Local_Y 1,390 to 1,410 ft of US-101 the positions of all lanes jump sideways and back by metres: the seam
-  between two cameras, by the look of it.
-- **Lane 8 of US-101**: few cars over 20 m of road; beyond Local_Y 1,380 ft, at that seam, its positions are left
-  out.
+  to 5 are left with a small shift the other way. That lane 6 is part of this mean was decided after the
+  alternative had been seen: with lanes 1 to 5 only, its median is 0.63 m. The column 'rows only' does not depend on this.
+- Around Local_Y 1,390 to 1,410 ft of US-101 the positions of all lanes jump sideways and back by metres, probably
+  where the images of two cameras meet.
+- **Lane 8 of US-101**: few cars over 20 m of road; beyond Local_Y 1,380 ft, at that place, its positions are
+  left out.
 - **Lane 6 of I-80**: on-ramp cars count for it from Local_Y 667 ft on, wherever they are across the road; they make
   its large distances.
 - **Lane 7 of I-80**: the source begins each car where it comes within 81.6 ft of the road's left edge, so the right
   half of the on-ramp is seen too seldom.
 - The road behind I-80's survey keeps six lanes; the real one loses its sixth to the next off-ramp, 505 m past the
   gore.
-- The speed limit is the same on the loop of US-101's on-ramp as on the freeway: nobody could drive it so fast.
-- Heights are left out.
+- The speed limit is the same on the loop of US-101's on-ramp as on the freeway: no car could drive it that fast.
+- The road is flat: heights are left out.
 """
 
 

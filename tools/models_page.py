@@ -1,4 +1,4 @@
-"""Say what the project's models rest on and how good they are: writes docs/models.md.
+"""Write docs/models.md: what the project's models were trained on, and how accurate they are.
 
     python tools/models_page.py --data DIR
 
@@ -28,8 +28,8 @@ SPEAKS_FOR = {"YIELD": Intention.YIELD, "NOT_YIELD": Intention.NOT_YIELD}
 HEAD = """\
 # The models
 
-What `pgm` and its kin learn from data: how speeds go on, the two times to arrival, and how often drivers yield, each
-for the merging cars that yield and those that do not. A model is one readable JSON file of counts in
+What the learned estimators (`pgm`, `fg` and their variants) take from data: transitions of the merging car's speed, the
+two times to arrival, and the share of drivers that yield, separately for the merging cars that yield and those that do not. A model is one readable JSON file of counts in
 `merge_cosim/estimators/learned/models/`, with the keys of the merging cars it was trained on; a sweep
 refuses to test it on these. A sweep takes the model of its data: `us101-ngsim` on real data and on the designed
 grid, `us101-surrogate` on surrogate data; `--model FILE` takes another.
@@ -37,22 +37,22 @@ grid, `us101-surrogate` on surrogate data; `--model FILE` takes another.
 Made by `python tools/models_page.py --data DIR` with the NGSIM files in `DIR`. It trains every model again; {same}.
 """
 HELD_OUT = """\
-On the other merging cars, both cars driving as logged, every 0.1 s until one of them reaches the merging point. In
-brackets the log loss, where the estimator gives probabilities (0.693 is that of a coin)."""
+The models are judged on the other merging cars. Both cars drive as logged; every 0.1 s counts until one of them reaches
+the merging point. In brackets the log loss, where the estimator gives probabilities (a guess of 50 % has 0.693)."""
 TAIL = """\
 ## How to read it
 
-- **Near the merging point the times to arrival give it away**: all that look at them are right. What could be won lies
-  far from it.
-- **Against a rule that learns nothing** (`slot-time`: who has the shorter time to arrival goes first), more accurate by
-  more than half a per cent are {better}.
+- **Near the merging point the times to arrival determine the order**: all estimators that use them are right. Estimators
+  can differ only further away.
+- **Against a rule that learns nothing** (`slot-time`: the car with the shorter time to arrival goes first), more
+  accurate by more than half a per cent are {better}.
 - **The speed term (`pgm-speed`) has little to learn.** Each merging car is paired with the host ahead of it and with
   the host behind it: it yields in one pair, does not in the other, and its speeds are counted for both intentions.
-  So do {both}. What is left to tell the two counts apart comes from the cars that stand in one class only, and from
-  windows of different length. It follows from how the pairs are made, not from the number of cars.
-- **{frames} frames of real data are not so many observations**: those of one car are all but alike. The cars are what
-  counts, and {cars} of them leave differences of a few per cent between estimators undecided.
-- Both cars drive as people drove. A host that acts on the estimates meets other situations than these.
+  So do {both}. The two counts differ only through the cars that stand in one class, and through windows of different
+  length. The reason is how the pairs are made, not the number of cars.
+- **{frames} frames of real data are not as many independent observations**: those of one car are nearly alike. With {cars}
+  cars, differences of a few per cent between estimators are not significant.
+- Both cars drive as logged. A host that acts on the estimates gets into other situations than these.
 """
 REAL = {"ngsim": "real data", "surrogate": "surrogate"}
 RULE = "slot-time"
@@ -116,7 +116,7 @@ def section(model: IntentionModel, report: dict[str, Any], trained: Encounters) 
     rests = {
         "ngsim": "real NGSIM data: published fragments of US-101 (mostly 07:50 to 08:05), and merging episodes derived "
         "from NGSIM, not a complete period",
-        "surrogate": "the SYNTHETIC [surrogate](surrogate.md), SUMO's own traffic; it says nothing about drivers",
+        "surrogate": "the SYNTHETIC [surrogate](surrogate.md), SUMO's own traffic; it is no evidence about human drivers",
     }[model.source]
     return f"""## {model.name}
 

@@ -48,11 +48,11 @@ SHORT = ("merging.ahead=any", "acc.d0=0")
 COARSE = ("host_offset.step=5", "host_speed.step=8", "merging_speed.step=8")
 HEAD = """# Sensitivity to what the papers leave open
 
-Failure rate in per cent by method, for each choice by itself, everything else as in the scenario file. The value that
-is the default stands in bold. `designed-2` is the grid of Dong, Dolan, Litkouhi 2017; `us101-replay` rests on
+Failure rate in per cent by method, for each choice by itself, everything else as in the scenario file. The default
+value is in bold. `designed-2` is the grid of Dong, Dolan, Litkouhi 2017; `us101-replay` rests on
 {source}.
 In brackets: the share of hosts that had not reached the merging point when the run ended, where there are any; a method
-can trade the one for the other. With `overlap_from=lane_change` a run is scored, and ends, sooner.
+can lower one rate by raising the other. With `overlap_from=lane_change` a run is scored, and ends, sooner.
 
 Made by
 
@@ -143,9 +143,9 @@ def findings(rows: pd.DataFrame) -> str:
         lines[-1] += f" One case more or less is {100 / here['n'].max():.2g} points."
         varied = rates.drop(index="")
         turned = [variation for variation, row in varied.iterrows() if reversed_pairs(default, row)]
-        lines.append(f"- The order of two methods is turned round by {grouped(turned) or 'no value at all'}.")
+        lines.append(f"- The order of two methods is reversed by {grouped(turned) or 'no value at all'}.")
         best = [variation for variation, row in varied.iterrows() if row["pgm"] < row.drop("pgm").min()]
-        lines.append(f"- `pgm` alone fails least, as the papers have it, with {grouped(best) or 'no value at all'}.")
+        lines.append(f"- `pgm` fails least of all, as in the papers, with {grouped(best) or 'no value at all'}.")
         name = varied.index.str.partition("=").get_level_values(0)
         span = (varied.groupby(name).max() - varied.groupby(name).min()).max(axis=1).sort_values(ascending=False)
         strong = ", ".join(f"`{choice}` {points:.1f}" for choice, points in span.head(3).items())

@@ -165,7 +165,7 @@ def section(site: str, title: str, named: dict[str, Paired], docs: Path) -> str:
             aggregates(site, named),
             f"![Distributions of the pairs of {title}](img/surrogate-{site}.png)",
             comparison(encounters),
-            "How well the sign of T_h − T_m alone tells who goes first, by the merging car's way left to its change:",
+            "How well T_h − T_m predicts which car goes first, by the merging car's distance to its lane change:",
             ambiguity(encounters),
         ]
     )
@@ -175,21 +175,21 @@ HEAD = """\
 # The surrogate
 
 Without NGSIM files the replay scenarios run on a *surrogate*: SUMO's own traffic on the same two ramps, written in
-NGSIM's columns and units and read by the same reader, with the same rules for pairs. Every row of a result and every
-heading says `surrogate` then. It stands in for the data so that everything can be tried and tested; it is no evidence
-about drivers.
+NGSIM's columns and units and read by the same reader, with the same rules for pairs. Rows of results and
+headings then say `surrogate`. It replaces the data so that everything can be tried and tested; it is no evidence about
+human drivers.
 
     merge-cosim ngsim surrogate --out DIR          # the files themselves; both sites take about a minute, once
 
 {minutes:.0f} minutes of traffic per site, in {recordings} recordings with a seed each: with one version of SUMO the
 same bytes every time. All drivers use SUMO's car-following model EIDM with its lane-change model LC2013; the on-ramp's
 cars come at even intervals, the others at random ones. The recipe (`merge_cosim/ngsim/surrogate/recipe.py`) was set
-by hand so that pairs, way to the lane change, speeds and the share of yielding come near the published figures (Dong,
-Dolan, Litkouhi 2017, Table I) and, on US-101, near the real pairs; no method was run on it.
+by hand so that number of pairs, distance to the lane change, speeds and share of yielding are close to the published figures
+(Dong, Dolan, Litkouhi 2017, Table I) and, on US-101, to the real pairs. No method was run on it for that.
 
 Made by `python tools/surrogate_page.py --data DIR` with the NGSIM files in `DIR`. 'Real' is what that folder held:
 {held}.
-Where these are fragments, not complete periods, their windows are cut short and their merging distance with them.
+Where these are fragments, not complete periods, windows and merging distances are shorter.
 Speeds and accelerations are those of the smoothed positions, by the same filter for both.
 """
 
@@ -197,23 +197,23 @@ TAIL = """\
 ## Where it falls short
 
 - **Accelerations** of SUMO's cars are too smooth: most are near zero, with a peak at -2 m/s² where drivers brake for a
-  gap. Real cars' vary all the time, also after smoothing. Whatever reads speed transitions learns something cleaner
-  here than in real data.
-- **No measurement noise.** Positions are exact to NGSIM's last decimal; a filter has nothing to do. (NGSIM's own speeds
-  heap up at some values, which shows as a comb in the pictures.)
+  gap. Real cars' vary all the time, also after smoothing. An estimator that learns speed transitions sees
+  less noise here than in real data.
+- **No measurement noise.** Positions are exact to NGSIM's last decimal; a filter has nothing to remove. (NGSIM's own
+  speeds accumulate at some values, visible as a comb in the pictures.)
 - **Merging happens too early**: many of SUMO's drivers change lane as soon as they may, at the very start of the
   auxiliary lane.
 - **Slow cars.** Some of SUMO's merging cars nearly stop before they find a gap, and hosts slow down for them. None of
-  the real ones at hand does.
+  the available real ones does.
 - **Gaps** at the lane change spread wider than the real ones.
-- **Bunches.** SUMO's merging cars often go in one behind the other without a host-lane car between them; such pairs are
+- **Platoons.** SUMO's merging cars often merge one behind the other without a host-lane car between them; such pairs are
   rejected, because the 'host' itself has just changed lane. These are mostly hosts ahead, so the share of yielding is
   below one half on US-101.
-- **The order is less plain** far from the lane change than in the real US-101 pairs (the AUC above).
-- **A driver's intention is SUMO's** lane-change model, a rule. Nothing of a negotiation between people is in it.
+- **The order is less clear** far from the lane change than in the real US-101 pairs (the AUC above).
+- **A driver's intention is SUMO's** lane-change model, a rule. It does not model a negotiation between people.
 - **I-80**: lane 7 changes its label at a fixed place in NGSIM's data, wherever a car is across the lane; in the
-  surrogate it changes where the car does, anywhere in the 85 m beside lane 6. From where the on-ramp is in view was
-  chosen to meet the published merging distance.
+  surrogate it changes where the car does, anywhere in the 85 m beside lane 6. The place from which the
+  on-ramp is in view was chosen to match the published merging distance.
 - **Demand and speed limits** are the model's, chosen for the right speeds and gaps; they are not the site's counts.
 """
 
