@@ -142,8 +142,8 @@ def section(name: str, data: Path, docs: Path) -> str:
         f"## {TITLES[name]}",
         f"Lane widths beside the auxiliary lane, from the left: {widths} m. {ties(name, ramp, plan)}",
         f"![Lanes of {TITLES[name]} with logged positions](img/geometry-{name}.png)",
-        "Distance of logged positions from our lane's centre [m]. 'Odd' are the cars that were not used in any fit; 'rows "
-        "only' is the alignment without any fit to trajectories, for all cars:",
+        "Distance of logged positions from our lane's centre [m]. 'Odd' are the cars that were not used in any fit; "
+        "'rows only' is the alignment without any fit to trajectories, for all cars:",
         residuals(ramp, plan, cars),
         "Distance of the drawn centre lines from our lanes' centres [m], where they are drawn:",
         shapes(ramp, plan, drawn),
@@ -151,8 +151,8 @@ def section(name: str, data: Path, docs: Path) -> str:
     if plan.corrections:
         parts += [
             corrections(plan),
-            "How well trajectories determine the position of Local_Y along the road: the shift with which lanes 7 and 8 fit best to "
-            "the drawn line, with a free lateral shift:",
+            "How well trajectories determine the position of Local_Y along the road: the shift with which lanes 7 "
+            "and 8 fit best to the drawn line, with a free lateral shift:",
             along_road(plan, drawn[DRAWN[name][6]], cars),
         ]
     return "\n\n".join(parts)
@@ -198,8 +198,8 @@ in netedit; `view.xml` in each folder colours the lanes by their role.
   (zone III), shifted so that (0, 0) is the host lane's axis at the gore; `<location>` says by how much, so that
   netedit and sumo-gui can lay a map behind the net.
 - **Main road.** One axis: the mean of the drawn centre lines, each shifted by its lane's position across the road,
-  averaged over 30 m, because the tracing varies by about 0.15 m. Lane widths are the mean distances of the painted boundaries.
-  Corners that change the shape by less than 2 cm are left out.
+  averaged over 30 m, because the tracing varies by about 0.15 m. Lane widths are the mean distances of the painted
+  boundaries. Corners that change the shape by less than 2 cm are left out.
 - **Along the road.** x = Local_Y - Local_Y of the gore is arc length along that axis, with the offset that the
   published rows give. SUMO's edge lengths are set to it, so every station is exact.
 - **Across the road.** Local_X is distance across that axis. Its zero is set by the cars of even number, so that the
@@ -220,9 +220,9 @@ TAIL = """\
 - The alignment along the road rests on two published rows at the upstream end; an error in NGSIM's scale would show
   at the other end. The lateral positions of all lanes together vary by up to a metre along the road, an error
   of NGSIM's cameras. That, and how people drive, is most of the residual.
-- **Lane 6 of US-101**: merging cars keep to the left of it. They are part of the mean that sets Local_X, so lanes 1
-  to 5 are left with a small shift the other way. That lane 6 is part of this mean was decided after the
-  alternative had been seen: with lanes 1 to 5 only, its median is 0.63 m. The column 'rows only' does not depend on this.
+- **Lane 6 of US-101**: merging cars keep to the left of it. They are part of the mean that sets Local_X, so lanes 1 to
+  5 are left with a small shift the other way. That lane 6 is part of this mean was decided after the alternative had
+  been seen: with lanes 1 to 5 only, its median is 0.63 m. The column 'rows only' does not depend on this.
 - Around Local_Y 1,390 to 1,410 ft of US-101 the positions of all lanes jump sideways and back by metres, probably
   where the images of two cameras meet.
 - **Lane 8 of US-101**: few cars over 20 m of road; beyond Local_Y 1,380 ft, at that place, its positions are

@@ -29,10 +29,10 @@ HEAD = """\
 # The models
 
 What the learned estimators (`pgm`, `fg` and their variants) take from data: transitions of the merging car's speed, the
-two times to arrival, and the share of drivers that yield, separately for the merging cars that yield and those that do not. A model is one readable JSON file of counts in
-`merge_cosim/estimators/learned/models/`, with the keys of the merging cars it was trained on; a sweep
-refuses to test it on these. A sweep takes the model of its data: `us101-ngsim` on real data and on the designed
-grid, `us101-surrogate` on surrogate data; `--model FILE` takes another.
+two times to arrival, and the share of drivers that yield, separately for the merging cars that yield and those that do
+not. A model is one readable JSON file of counts in `merge_cosim/estimators/learned/models/`, with the keys of the
+merging cars it was trained on; a sweep refuses to test it on these. A sweep takes the model of its data: `us101-ngsim`
+on real data and on the designed grid, `us101-surrogate` on surrogate data; `--model FILE` takes another.
 
 Made by `python tools/models_page.py --data DIR` with the NGSIM files in `DIR`. It trains every model again; {same}.
 """
@@ -42,16 +42,16 @@ the merging point. In brackets the log loss, where the estimator gives probabili
 TAIL = """\
 ## How to read it
 
-- **Near the merging point the times to arrival determine the order**: all estimators that use them are right. Estimators
-  can differ only further away.
+- **Near the merging point the times to arrival determine the order**: all estimators that use them are right.
+  Estimators can differ only further away.
 - **Against a rule that learns nothing** (`slot-time`: the car with the shorter time to arrival goes first), more
   accurate by more than half a per cent are {better}.
 - **The speed term (`pgm-speed`) has little to learn.** Each merging car is paired with the host ahead of it and with
   the host behind it: it yields in one pair, does not in the other, and its speeds are counted for both intentions.
   So do {both}. The two counts differ only through the cars that stand in one class, and through windows of different
   length. The reason is how the pairs are made, not the number of cars.
-- **{frames} frames of real data are not as many independent observations**: those of one car are nearly alike. With {cars}
-  cars, differences of a few per cent between estimators are not significant.
+- **{frames} frames of real data are not as many independent observations**: those of one car are nearly alike. With
+  {cars} cars, differences of a few per cent between estimators are not significant.
 - Both cars drive as logged. A host that acts on the estimates gets into other situations than these.
 """
 REAL = {"ngsim": "real data", "surrogate": "surrogate"}
@@ -116,7 +116,8 @@ def section(model: IntentionModel, report: dict[str, Any], trained: Encounters) 
     rests = {
         "ngsim": "real NGSIM data: published fragments of US-101 (mostly 07:50 to 08:05), and merging episodes derived "
         "from NGSIM, not a complete period",
-        "surrogate": "the SYNTHETIC [surrogate](surrogate.md), SUMO's own traffic; it is no evidence about human drivers",
+        "surrogate": "the SYNTHETIC [surrogate](surrogate.md), SUMO's own traffic; "
+        "it is no evidence about human drivers",
     }[model.source]
     return f"""## {model.name}
 

@@ -183,9 +183,9 @@ human drivers.
 
 {minutes:.0f} minutes of traffic per site, in {recordings} recordings with a seed each: with one version of SUMO the
 same bytes every time. All drivers use SUMO's car-following model EIDM with its lane-change model LC2013; the on-ramp's
-cars come at even intervals, the others at random ones. The recipe (`merge_cosim/ngsim/surrogate/recipe.py`) was set
-by hand so that number of pairs, distance to the lane change, speeds and share of yielding are close to the published figures
-(Dong, Dolan, Litkouhi 2017, Table I) and, on US-101, to the real pairs. No method was run on it for that.
+cars come at even intervals, the others at random ones. The recipe (`merge_cosim/ngsim/surrogate/recipe.py`) was set by
+hand so that number of pairs, distance to the lane change, speeds and share of yielding are close to the published
+figures (Dong, Dolan, Litkouhi 2017, Table I) and, on US-101, to the real pairs. No method was run on it for that.
 
 Made by `python tools/surrogate_page.py --data DIR` with the NGSIM files in `DIR`. 'Real' is what that folder held:
 {held}.
@@ -206,9 +206,9 @@ TAIL = """\
 - **Slow cars.** Some of SUMO's merging cars nearly stop before they find a gap, and hosts slow down for them. None of
   the available real ones does.
 - **Gaps** at the lane change spread wider than the real ones.
-- **Platoons.** SUMO's merging cars often merge one behind the other without a host-lane car between them; such pairs are
-  rejected, because the 'host' itself has just changed lane. These are mostly hosts ahead, so the share of yielding is
-  below one half on US-101.
+- **Platoons.** SUMO's merging cars often merge one behind the other without a host-lane car between them; such pairs
+  are rejected, because the 'host' itself has just changed lane. These are mostly hosts ahead, so the share of yielding
+  is below one half on US-101.
 - **The order is less clear** far from the lane change than in the real US-101 pairs (the AUC above).
 - **A driver's intention is SUMO's** lane-change model, a rule. It does not model a negotiation between people.
 - **I-80**: lane 7 changes its label at a fixed place in NGSIM's data, wherever a car is across the lane; in the

@@ -1,1 +1,1 @@
-"""How fast it is: against SUMO's bare steps, against the obvious alternatives, and by cases and processes."""
+"""Timings: against SUMO's bare steps, against simple alternatives, and by cases and processes."""

@@ -1,4 +1,4 @@
-"""Our loop beside the obvious alternatives, on the same cases with the same decisions."""
+"""Our loop beside simple alternatives, on the same cases with the same decisions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Timing:
 
 
 def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
-    """Time our loop on `cases` cases and the alternatives on every so manieth of them, in turn, `rounds` times.
+    """Time our loop on `cases` cases and the alternatives on an evenly spaced part of them, in turn, `rounds` times.
 
     Raises:
         UserError: An alternative's outcome differs from ours, so the times would not compare.

@@ -1,4 +1,4 @@
-"""`merge-cosim methods`, `scenarios` and `cache`: what there is."""
+"""`merge-cosim methods`, `scenarios` and `cache`: lists."""
 
 from textwrap import wrap
 from typing import Annotated, Any

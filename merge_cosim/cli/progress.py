@@ -1,4 +1,4 @@
-"""A progress bar on standard error, and what an interrupt says."""
+"""A progress bar on standard error, and the message after an interrupt."""
 
 import errno
 from collections.abc import Callable, Iterator

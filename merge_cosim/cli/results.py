@@ -1,4 +1,4 @@
-"""`merge-cosim report`, `compare`, `reproduce`, `bounds` and `bench`: what results and runs amount to."""
+"""`merge-cosim report`, `compare`, `reproduce`, `bounds` and `bench`: results and what is made from them."""
 
 from pathlib import Path
 from typing import Annotated

@@ -17,7 +17,7 @@ NEVER = 1 << 30
 
 
 class Intention(IntEnum):
-    """What the merging driver means to do; as a label also what the log shows he did."""
+    """What the merging driver intends; as a label also what the driver did in the log."""
 
     UNKNOWN = -1
     YIELD = 0

@@ -1,4 +1,4 @@
-"""What the cars see of each other in one cycle, and the setting they drive in: the currency of floor 2."""
+"""What the host observes in one cycle, and the setting of a run: the input of estimators and controllers."""
 
 from dataclasses import dataclass
 
@@ -59,6 +59,6 @@ class Observation:
 
     @property
     def gap(self) -> FloatArray:
-        """Bumper-to-bumper distance [m] of whoever is behind to whoever is ahead; negative where the bodies overlap."""
+        """Bumper-to-bumper distance [m] from the car behind to the car ahead; negative where the bodies overlap."""
         leader_length = np.where(self.merging_ahead, self.merging_length, self.host_length)
         return np.abs(self.merging_station - self.host_station) - leader_length

@@ -1,4 +1,4 @@
-"""Random numbers by counter: each encounter has a stream of its own, whatever stands beside it in the batch.
+"""Random numbers by counter: each encounter has its own stream, independent of the others in the batch.
 
 The i-th number of a stream is a hash of the stream's key and i (SplitMix64: Steele, Lea, Flood, Fast splittable
 pseudorandom number generators, OOPSLA 2014), so whole batches are drawn at once and no generator objects are kept.
@@ -21,7 +21,7 @@ _UNIT_BITS, _UNIT = np.uint64(11), 2.0**-53
 
 
 def stream_keys(names: AnyArray, seed: int) -> Keys:
-    """Return the key of each name's stream under a seed, shape (n,): the same for the same name wherever it stands."""
+    """Return the key of each name's stream under a seed, shape (n,): the same for the same name at any index."""
     digests = b"".join(hashlib.blake2b(f"{seed}/{name}".encode(), digest_size=8).digest() for name in names.tolist())
     return np.frombuffer(digests, dtype="<u8").astype(np.uint64)
 

@@ -1,4 +1,4 @@
-"""Registries: a component is one class in one file of its room, found by name without another edit."""
+"""Registries: components (estimators, controllers, merging cars) by name, one class in one file each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units and the few constants of time and tolerance that every floor shares. SI everywhere inside."""
+"""Units and the few constants of time and tolerance that all packages share. SI everywhere inside."""
 
 from typing import Annotated, Any
 

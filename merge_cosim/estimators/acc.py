@@ -1,4 +1,4 @@
-"""ACC merging: whoever is nearer to the merging point goes first."""
+"""ACC merging: the car nearer to the merging point goes first."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""The role of an estimator: from what is seen to the log-odds of NOT_YIELD."""
+"""The base class of estimators: from an observation to the log-odds of NOT_YIELD."""
 
 from __future__ import annotations
 

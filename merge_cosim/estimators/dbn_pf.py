@@ -18,7 +18,7 @@ from merge_cosim.estimators.particles import Cloud, Dice, low_variance
 
 
 class Maneuver(IntEnum):
-    """What the driver of the merging car does about the host."""
+    """How the driver of the merging car treats the host."""
 
     YIELD = 0
     NOT_YIELD = 1
@@ -60,10 +60,11 @@ class DbnPf(Estimator):
     a tau, 0)`, `s' = s + v tau + (v' - v) (tau + dt) / 2`. Weights `N(s_obs; s, sigma_s) N(v_obs; v, sigma_v)` are
     kept as logarithms, then low-variance resampling.
 
-    `P(N) = w_N + w_I [T_m < T_h]`, since who ignores the host keeps his course, clipped to [1/(2M), 1 - 1/(2M)]; held
-    between updates. Where a_free meets a constraint, that maneuver drives as IGNORE does and cannot be told from it.
-    Unlike the blog's, the filter lets maneuvers change, as its author asks for. His sentence that an observed
-    acceleration shifts the particles toward yielding contradicts the sentence before it; here it shifts them away.
+    `P(N) = w_N + w_I [T_m < T_h]`, since a driver that ignores the host keeps the speed, clipped to [1/(2M),
+    1 - 1/(2M)]; held between updates. Where a_free meets a constraint, that maneuver drives as IGNORE does, and the two
+    cannot be told apart. Unlike the blog's, the filter lets maneuvers change, as its author asks for. The blog's
+    sentence that an observed acceleration shifts the particles toward yielding contradicts the sentence before it; here
+    it shifts them away.
 
     Attributes:
         particles: Number M of particles.
@@ -76,7 +77,7 @@ class DbnPf(Estimator):
         sigma_station: Standard deviation of the observed station [m].
         sigma_speed: Standard deviation of the observed speed [m/s].
         start_yield, start_not_yield: Shares of the maneuvers at the start; the rest ignores.
-        change_rate: Rate at which a driver changes his maneuver, to either other one alike [1/s].
+        change_rate: Rate at which a driver changes the maneuver, to either other one alike [1/s].
         redrawn: Share of the particles drawn anew at the observation, maneuvers by the present belief.
     """
 

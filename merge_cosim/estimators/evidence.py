@@ -14,7 +14,7 @@ LogRatio = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 class SpeedDensity(Protocol):
-    """P(V_t | V_{t-lag}, I), in whatever form."""
+    """P(V_t | V_{t-lag}, I) in any form."""
 
     def log_ratio(self, before: FloatArray, now: FloatArray) -> FloatArray:
         """`log P(now | before, N) - log P(now | before, Y)`, shape (n,)."""
@@ -42,7 +42,7 @@ class SpeedEvidence:
         self._keep, self._left = keep, keep**window
 
     def start(self, count: int) -> None:
-        """Make room for `count` drivers. Rings are shared: a driver who begins later finds zeros in his."""
+        """Make room for `count` drivers. All share one ring buffer; a driver that begins later has zeros in it."""
         self._cycle, self._settled = 0, self._lag
         self._begin = np.zeros(count, dtype=np.int64)
         self._sum = np.zeros(count)
@@ -60,7 +60,7 @@ class SpeedEvidence:
         """Take in the speeds of one cycle [m/s] and return S_t; both of shape (n,)."""
         before = self._speeds[self._cycle % self._lag]
         ratio = self._log_ratio(before, speed)
-        if self._cycle < self._settled:  # somebody has no speed `lag` cycles ago; for all others this is times 1
+        if self._cycle < self._settled:  # some drivers have no speed `lag` cycles ago
             ratio *= self._begin <= self._cycle - self._lag
         if self._lag > 1:
             ratio /= self._lag

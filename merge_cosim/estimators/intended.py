@@ -1,4 +1,4 @@
-"""The acceleration that a merging driver of either intention means to drive, as iPCB takes it."""
+"""The acceleration that a merging driver of either intention plans, as iPCB assumes it."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -15,31 +15,31 @@ from merge_cosim.estimators.base import Estimator, certain, estimators
 @estimators.register
 @dataclass(kw_only=True)
 class AlwaysGo(Estimator):
-    """Takes every driver to YIELD, so the host drives freely until somebody is in the lane ahead."""
+    """Assumes YIELD for every driver, so the host drives freely until a car is in the lane ahead."""
 
     name: ClassVar[str] = "always-go"
 
     def update(self, seen: Observation) -> FloatArray:
-        """YIELD, for ever."""
+        """YIELD in every cycle."""
         return np.full(len(seen.host_station), -np.inf)
 
 
 @estimators.register
 @dataclass(kw_only=True)
 class AlwaysYield(Estimator):
-    """Takes every driver to NOT_YIELD, so the host keeps distance to every merging car."""
+    """Assumes NOT_YIELD for every driver, so the host keeps distance to every merging car."""
 
     name: ClassVar[str] = "always-yield"
 
     def update(self, seen: Observation) -> FloatArray:
-        """NOT_YIELD, for ever."""
+        """NOT_YIELD in every cycle."""
         return np.full(len(seen.host_station), np.inf)
 
 
 @estimators.register
 @dataclass(kw_only=True)
 class AlwaysBrake(AlwaysYield):
-    """Brakes fully and never passes: fails nothing, reaches nothing."""
+    """Brakes fully: the host never fails and never arrives."""
 
     name: ClassVar[str] = "always-brake"
     default_controller: ClassVar[str] = "brake"
@@ -48,9 +48,10 @@ class AlwaysBrake(AlwaysYield):
 @estimators.register
 @dataclass(kw_only=True)
 class OracleLabel(Estimator):
-    """Knows the label. Not a bound: the host's own driving may turn the order round.
+    """Knows the label. Not a bound: the host's own driving may change the order.
 
-    Where a case has no label (a scripted driver who ignores the host), who arrives first goes first, as in `slot-time`.
+    Where a case has no label (a scripted driver that ignores the host) the car that arrives first goes first, as in
+    `slot-time`.
     """
 
     name: ClassVar[str] = "oracle-label"

@@ -1,4 +1,4 @@
-"""The role of a merging car: how the other driver drives."""
+"""The base class of merging cars: how the other driver drives."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class MergingCar(Component):
         """
 
     def intentions(self, encounters: Encounters) -> IntArray:
-        """What the drivers of some encounters mean to do (`Intention`), where it is scripted; shape (n,)."""
+        """The intentions of the drivers of some encounters (`Intention`), where they are scripted; shape (n,)."""
         return np.full(len(encounters), int(Intention.UNKNOWN))
 
     def observed_speed(self, age: IntArray, speed: FloatArray) -> FloatArray:
-        """The speed [m/s] that the host's sensors report for him; the true one unless the log says otherwise."""
+        """The speed [m/s] that the host's sensors report of the merging car; the true one unless a log has another."""
         return speed
 
 

@@ -21,8 +21,8 @@ class Designed(DistanceKeeping, MergingCar):
 
     Attributes:
         headway: Time headway T [s].
-        ahead: `clear`: the host's rear bumper is past his front bumper; `in-lane`: the host's front is past his, both
-            past the merging point; `any`: the host's front is past his.
+        ahead: `clear`: the host's rear bumper is past the merging car's front bumper; `in-lane`: the host's front is
+            past the merging car's, both past the merging point; `any`: the host's front is past the merging car's.
     """
 
     name: ClassVar[str] = "designed"

@@ -1,7 +1,7 @@
-"""A driver with a hidden intention: he yields, does not yield, or ignores the host, and may change his mind.
+"""A driver with a hidden intention: to yield, not to yield, or to ignore the host; the intention may change.
 
-A test of this project's own (Designed Test III): estimates are judged against what the driver means, and early
-decisions matter, because he reacts to what the host does.
+Used in this project's own Designed Test III: estimates are compared with the driver's intention, and early decisions
+matter, because the driver reacts to the host.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from merge_cosim.core.units import TOLERANCE, FloatArray, IntArray, Share
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 
 IGNORE = int(Intention.UNKNOWN)
-"""A driver who ignores the host has no intention towards him: the order is left to the two arrivals."""
+"""Intention of a driver that ignores the host: the order follows from the two arrivals."""
 _TYPES = np.array([Intention.YIELD, Intention.NOT_YIELD, IGNORE])
 _NEAR = 0.1
 """Way [m] below which a planned acceleration is no longer computed from the way left."""
@@ -28,13 +28,13 @@ _NEAR = 0.1
 
 @dataclass(frozen=True)
 class Script:
-    """What each driver is going to do; every array has shape (n,).
+    """What each driver will do; every array has shape (n,).
 
     Attributes:
         first, last: Intention at the start and in the end (`Intention`, or `IGNORE`).
-        changes_at: Station [m] at which the first gives way to the last; inf for who stays with it.
+        changes_at: Station [m] at which the first gives way to the last; inf without a change.
         reaction: Time [s] of constant speed at the start.
-        margin: Time [s] that he wants to arrive after or before the host.
+        margin: Time [s] by which the driver plans to arrive after or before the host.
     """
 
     first: IntArray
@@ -49,23 +49,24 @@ class Script:
 class Hidden(DistanceKeeping, MergingCar):
     """Plans to arrive a margin after (yield) or before (not yield) the host, anew in every cycle, with some noise.
 
-    Constant speed for a reaction time; then the smallest constant acceleration that brings him to the merging point at
-    least the margin after, or before, a host at constant speed: 0 if his present speed does. Who ignores the host holds
-    his speed. Once the host has passed the merging point (for who ignores: once he has himself), he keeps distance to a
-    host ahead and drives freely without one. First-order noise is added to the acceleration after the reaction time.
+    Constant speed for a reaction time; then the smallest constant acceleration that brings the car to the merging point
+    at least the margin after, or before, a host at constant speed; 0 if the present speed does. A driver that ignores
+    the host holds the speed. Once the host has passed the merging point (with IGNORE: once the car itself has), the
+    driver keeps distance to a host ahead and drives freely without one. First-order noise is added to the
+    acceleration after the reaction time.
 
     Attributes:
         seed: Seed of the scripts and of the noise.
         yield_share, not_yield_share: Shares of the two types; the others ignore the host.
-        change_share: Share of drivers who change to another type, once, at a station uniform between their start and
+        change_share: Share of drivers that change to another type, once, at a station uniform between their start and
             `change_before`; the new type is drawn from the other two in proportion to their shares.
-        change_before: Way to the merging point [m] within which nobody changes.
+        change_before: Way to the merging point [m] within which no driver changes.
         max_reaction: The reaction time is uniform from 0 to this [s].
         min_margin, max_margin: The margin is uniform between these [s].
         sigma: Standard deviation of the noise [m/s^2].
         time_constant: Its time constant [s].
         headway: Time headway to a host ahead [s].
-        min_acceleration, max_acceleration: Bounds of what he plans and of what he does [m/s^2].
+        min_acceleration, max_acceleration: Bounds of the planned and of the driven acceleration [m/s^2].
     """
 
     name: ClassVar[str] = "hidden"
@@ -84,7 +85,7 @@ class Hidden(DistanceKeeping, MergingCar):
     max_acceleration: PositiveFloat = 3.0
 
     def script(self, encounters: Encounters) -> Script:
-        """Draw what the drivers of some encounters are going to do; a case's script depends on its name alone."""
+        """Draw what the drivers of some encounters will do; a case's script depends only on its name."""
         n = len(encounters)
         keys = stream_keys(np.array([f"driver/{case}" for case in encounters.case]), self.seed)
         u = uniform(keys, np.zeros(n, dtype=np.int64), 6)
@@ -105,7 +106,7 @@ class Hidden(DistanceKeeping, MergingCar):
         )
 
     def intentions(self, encounters: Encounters) -> IntArray:
-        """What he means in the end: YIELD, NOT_YIELD, or UNKNOWN for who ignores the host."""
+        """The final intention: YIELD, NOT_YIELD, or UNKNOWN for a driver that ignores the host."""
         return self.script(encounters).last
 
     def start(self, encounters: Encounters, count: int, setting: Setting) -> None:
@@ -120,13 +121,13 @@ class Hidden(DistanceKeeping, MergingCar):
         self._changes_at, self._reaction, self._margin = (np.full(count, np.inf) for _ in range(3))
 
     def reset(self, rows: IntArray, cases: IntArray) -> None:
-        """Hand the scripts of the new encounters to their rows."""
+        """Copy the scripts of the new encounters to their rows."""
         self._keys[rows] = self._case_keys[cases]
         self._first[rows], self._last[rows] = self._script.first[cases], self._script.last[cases]
         self._changes_at[rows] = self._script.changes_at[cases]
         self._reaction[rows], self._margin[rows] = self._script.reaction[cases], self._script.margin[cases]
         start = normal(self._keys[rows], np.zeros(len(rows), dtype=np.int64), 1)[:, 0]
-        self._noise[rows] = self.sigma * start  # as if the noise had always gone on
+        self._noise[rows] = self.sigma * start  # the stationary distribution
 
     def next_speed(self, age: IntArray, now: Observation) -> FloatArray:
         """One step: the plan, or distance keeping, and the noise."""
@@ -145,7 +146,7 @@ class Hidden(DistanceKeeping, MergingCar):
     def plan(self, now: Observation, intention: IntArray) -> FloatArray:
         """The smallest constant acceleration [m/s^2] to arrive the margin after or before the host, within the bounds.
 
-        From `d = v T + a T^2 / 2`; where braking by that law would stop him before the point, he stops at it.
+        From `d = v T + a T^2 / 2`; where that law would stop the car before the point, it stops at the point.
         """
         yields = intention == Intention.YIELD
         time = np.where(yields, now.host_arrival + self._margin, now.host_arrival - self._margin)

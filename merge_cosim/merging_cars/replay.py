@@ -17,10 +17,10 @@ from merge_cosim.merging_cars.base import MergingCar, merging_cars
 @merging_cars.register
 @dataclass(kw_only=True)
 class Replay(MergingCar):
-    """Meets the logged station exactly in every cycle: `v_t = (s_t - s_{t-1}) / dt`.
+    """Is at the logged station in every cycle: `v_t = (s_t - s_{t-1}) / dt`.
 
-    Past the end of the log he goes on at his last speed. The host observes the causally filtered (or raw) speed of the
-    log, not the smoothed one that he drives with, which knows the future.
+    After the end of the log the car keeps its last speed. The host observes the causally filtered (or raw) speed of the
+    log, not the smoothed one that the car drives with, which depends on later samples.
     """
 
     name: ClassVar[str] = "replay"
@@ -45,7 +45,7 @@ class Replay(MergingCar):
         self._row_last = np.ones(count, dtype=np.int64)
 
     def reset(self, rows: IntArray, cases: IntArray) -> None:
-        """Point the rows at their logs."""
+        """Set the logs of the rows."""
         self._row_first[rows] = self._first[cases]
         self._row_last[rows] = self._last[cases]
 

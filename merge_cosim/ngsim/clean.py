@@ -1,4 +1,4 @@
-"""Making numbers of a file's cells, and naming the cell that is none or is impossible."""
+"""Parsing a file's cells into numbers; an error names the cell that is not a number or not possible."""
 
 from dataclasses import dataclass
 

@@ -34,7 +34,7 @@ STAND_INS = {
     39.44: "SUMO's default for motorways of OpenStreetMap",
     44.44: "the default of older versions of SUMO for motorways of OpenStreetMap",
 }
-"""Speeds [m/s] that stand in a net where nobody has given any."""
+"""Speeds [m/s] that netconvert sets where no speed is given."""
 
 
 def check(folder: Path) -> list[str]:
@@ -56,7 +56,7 @@ def check(folder: Path) -> list[str]:
 
 
 def _of_encounters(net: sumolib.net.Net, file: RampFile, ramp: Ramp) -> list[str]:
-    """What hinders encounters; of a net that somebody has for living traffic it is only good to know."""
+    """Problems for encounters; for a described net, which is for living traffic, they are notes."""
     return _speeds(net, file) + _reach(ramp) + _lights(net, file)
 
 
@@ -133,7 +133,7 @@ def _connections(net: sumolib.net.Net, file: RampFile) -> list[str]:
 
 
 def _speeds(net: sumolib.net.Net, file: RampFile) -> list[str]:
-    """Lanes of the main road that are slower than the speed limit, and speeds that nobody has given."""
+    """Lanes of the main road that are slower than the speed limit, and speeds that were not given."""
     problems = []
     for lane in (net.getEdge(edge).getLane(index) for edge, index in zip(file.main, file.host_lane, strict=True)):
         if lane.getSpeed() < file.speed_limit:
@@ -210,7 +210,7 @@ def _lane_end(net: sumolib.net.Net, file: RampFile) -> list[str]:
         return []
     after = file.main.index(last) + 1
     if after == len(file.main):
-        return [f"ramp: the auxiliary lane goes on to the road's end: nobody has to merge; end it before '{last}'"]
+        return [f"ramp: the auxiliary lane goes on to the road's end: no car has to merge; end it before '{last}'"]
     onward, host = file.main[after], file.host_lane[after]
     links = net.getEdge(last).getLane(index).getOutgoing()
     further = [link.getToLane() for link in links if link.getToLane().getEdge().getID() == onward]
@@ -222,7 +222,7 @@ def _lane_end(net: sumolib.net.Net, file: RampFile) -> list[str]:
 
 
 def _lights(net: sumolib.net.Net, file: RampFile) -> list[str]:
-    """Traffic lights on a path; in an encounter nobody heeds them."""
+    """Traffic lights on a path; in an encounter the cars ignore them."""
     met = [net.getEdge(edge).getToNode() for edge in dict.fromkeys(file.main + file.ramp)]
     return [
         f"main/ramp: node '{node.getID()}' has a traffic light, which an encounter's cars do not see; make its type "

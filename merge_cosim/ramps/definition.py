@@ -43,7 +43,7 @@ class RampFile(Table):
     Attributes:
         title: One line for lists and reports.
         net: File name of the built net, beside this file.
-        described: The net is somebody's own, which this file describes and nobody here builds (`ramp describe`).
+        described: The net belongs to the user; this file describes it, and it is not built (`ramp describe`).
         main: Edges of the main road, in driving order.
         host_lane: SUMO lane index of the host on each edge of `main`.
         ramp: Edges of the merging car, in driving order; where there is an auxiliary lane, the last ones are edges of

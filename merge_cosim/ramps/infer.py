@@ -200,7 +200,7 @@ def _beside(lane: Lane, main: list[Lane]) -> tuple[list[Lane], Lane | None, str]
     keeps_left = "; left-hand traffic cannot be read" if lane.getIndex() > main[0].getIndex() else ""
     raise UserError(
         f"the on-ramp's lane {lane.getID()} goes on beside the road for {length:.0f} m, as far as was looked or the "
-        f"net reaches: nobody has to merge; take a larger extract if it ends further on{keeps_left}"
+        f"net reaches: no car has to merge; take a larger extract if it ends further on{keeps_left}"
     )
 
 

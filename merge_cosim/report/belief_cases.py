@@ -1,4 +1,4 @@
-"""Designed approaches on which the pages about the methods show what an estimator believes."""
+"""Designed approaches that the pages of the methods use to show an estimator's belief."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ LENGTH = 5.0
 
 
 def stays_behind() -> list[Observation]:
-    """A driver who is behind the host and stays there, cycle by cycle for 12 s (DBN-PF blog post, first example)."""
+    """A driver that is behind the host and stays there, cycle by cycle for 12 s (DBN-PF blog post, first example)."""
     return _approach(np.zeros(round(DURATION / DT)))
 
 
 def pulls_ahead() -> list[Observation]:
-    """A driver who is behind but accelerates from 5 s on and ends ahead (DBN-PF blog post, second example)."""
+    """A driver that is behind but accelerates from 5 s on and ends ahead (DBN-PF blog post, second example)."""
     time = np.arange(round(DURATION / DT)) * DT
     return _approach(np.where(time >= PULLS_FROM - DT / 2, PULLS_WITH, 0.0))
 

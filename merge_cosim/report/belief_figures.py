@@ -1,4 +1,4 @@
-"""Figures of what an estimator believes: particle clouds, maneuvers over time, the costs that iPCB weighs."""
+"""Figures of an estimator's belief: particle clouds, maneuvers over time, the costs that iPCB compares."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ E = TypeVar("E", bound=Estimator)
 
 
 def clouds_figure(model: IntentionModel) -> Figure:
-    """Particles of DBN-PF before, between and after one update, for the driver who pulls ahead."""
+    """Particles of DBN-PF before, between and after one update, for the driver that pulls ahead."""
     scenes = pulls_ahead()[: round(CLOUDS_AT / DT) + 1]
     estimator = _ready(DbnPf(), model)
     for scene in scenes:
@@ -71,7 +71,7 @@ def clouds_figure(model: IntentionModel) -> Figure:
 
 
 def belief_figure(model: IntentionModel) -> Figure:
-    """Shares of the maneuvers and P(not yield) over 12 s, for a driver who stays behind and one who pulls ahead."""
+    """Shares of the maneuvers and P(not yield) over 12 s, for a driver that stays behind and one that pulls ahead."""
     cases = {"stays behind": stays_behind(), "pulls ahead from 5 s on": pulls_ahead()}
     with canvas.style():
         figure, all_axes = canvas.grid_of(2, 2, (3.9, 3.2))
@@ -107,9 +107,12 @@ def candidates_figure(model: IntentionModel) -> Figure:
     command = float(law.command(now, np.array([pgm]), np.array([pgm >= 0.0]))[0])
     with canvas.style():
         figure, axes = canvas.panel()
-        axes.plot(planner.candidates, cost[Intention.YIELD], color=COLORS[Maneuver.YIELD], label="if he yields")
+        axes.plot(planner.candidates, cost[Intention.YIELD], color=COLORS[Maneuver.YIELD], label="if the driver yields")
         axes.plot(
-            planner.candidates, cost[Intention.NOT_YIELD], color=COLORS[Maneuver.NOT_YIELD], label="if he does not"
+            planner.candidates,
+            cost[Intention.NOT_YIELD],
+            color=COLORS[Maneuver.NOT_YIELD],
+            label="if the driver does not",
         )
         label = f"ipcb expects, P(not yield) = {p:.2f}"
         axes.plot(planner.candidates, expected, color=METHOD_COLORS["ipcb"], lw=3.0, alpha=0.7, label=label)

@@ -1,4 +1,4 @@
-"""SUMO's word on collisions against our geometry: how often they agree, and why not."""
+"""SUMO's collision report beside our geometry: how often they agree, and the reasons where they do not."""
 
 from __future__ import annotations
 

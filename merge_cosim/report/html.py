@@ -1,4 +1,4 @@
-"""Pages that need nothing else: templates, and figures inside them."""
+"""HTML pages without external parts: templates with embedded figures."""
 
 from __future__ import annotations
 

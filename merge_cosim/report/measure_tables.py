@@ -1,4 +1,4 @@
-"""Tables beside the main one: surrogate safety and comparison, and how good the beliefs were on the way."""
+"""Tables beside the main one: surrogate safety and comparison, and the quality of the beliefs by distance."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ BELIEF = (
 
 
 def safety_table(summary: pd.DataFrame, section: Section) -> Table:
-    """Surrogate safety, comfort, likeness to the human, and the failures of each pair of methods on the same cases."""
+    """Surrogate safety, comfort, difference to the logged host, and failures of pairs of methods on the same cases."""
     rows = of_section(summary, section).copy()
     rows["cluster_pct"] = ranges(rows["cluster_low_pct"], rows["cluster_high_pct"])
     rows["labelled"] = rows["labelled"].where(rows["labelled"] > 0)

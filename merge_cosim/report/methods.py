@@ -1,4 +1,4 @@
-"""The order and the looks of the methods: the same in every table and figure."""
+"""Order, colours and line styles of the methods: the same in every table and figure."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def in_order(methods: Iterable[str]) -> list[str]:
 
 
 def looks(methods: Iterable[str]) -> Mapping[str, Look]:
-    """Give each method its look; known methods have theirs whatever stands beside them."""
+    """Give each method its look; a known method has the same one in every figure."""
     ordered = in_order(methods)
     others = [method for method in ordered if method not in COLORS and not is_reference(method)]
     chosen = {method: Look(COLORS[method]) for method in ordered if method in COLORS}

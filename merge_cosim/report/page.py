@@ -1,4 +1,4 @@
-"""The report of a sweep: one HTML file that needs nothing else, and its tables as files."""
+"""The report of a sweep: one HTML file without external parts, and its tables as files."""
 
 from __future__ import annotations
 

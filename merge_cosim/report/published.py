@@ -1,4 +1,4 @@
-"""The papers' own figures, shown beside ours and never tuned to."""
+"""The papers' published figures, shown beside ours; nothing is tuned to them."""
 
 from __future__ import annotations
 

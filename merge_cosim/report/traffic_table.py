@@ -1,4 +1,4 @@
-"""The table of scenes: what became of the traffic as a whole."""
+"""The table of scenes: measures of the traffic as a whole."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def pairs_of_site(name: str, pairs: Pairs, data: Path | None, source: SourceChoi
 
 
 def _refuse_nothing(data: Path, wanted: Site) -> None:
-    """Refuse a folder that can stand for no site at all: a user who names one does not expect the surrogate."""
+    """Refuse a folder with data of no site: a user that names one does not expect the surrogate."""
     sites = list({one.name: one for one in (*shipped_sites(), wanted)}.values())
     if any(load_trajectories(data, one) is not None for one in sites) or episode_files(data):
         return

@@ -189,7 +189,7 @@ def default_methods() -> list[str]:
 
 
 def methods_for(encounters: Encounters, methods: Iterable[Method]) -> list[Method]:
-    """The methods that can run on these encounters: who looks at labels needs some, and the human host needs a log."""
+    """The methods that can run on these encounters: `oracle-label` needs labels, `human` a log."""
     labelled = bool((encounters.label >= 0).any())
     return [
         method

@@ -203,7 +203,7 @@ class Traffic(Strict):
     Attributes:
         replications: Number of scenes, each with a SUMO seed of its own.
         seed: SUMO's seed of the first one.
-        demand: Who drives, and how.
+        demand: The traffic: how many cars, and SUMO's models.
         attention: Which merging cars a host attends to.
     """
 

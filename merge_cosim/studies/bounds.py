@@ -1,4 +1,4 @@
-"""What any host could have done against a log: pass without a failure at all, and how soon.
+"""Bounds for any host against a log: whether it can pass without a failure, and with which delay.
 
 Feasibility: full braking keeps the smallest station in every cycle, full throttle up to the limit the largest; if both
 fail, no host passes behind or ahead. It is decided by the loop and its scoring themselves, in the closed form. Smallest

@@ -1,4 +1,4 @@
-"""Judging a model on merging cars it has never seen: its estimators frame by frame, its densities by transition."""
+"""Judging a model on merging cars not trained on: its estimators frame by frame, its densities by transition."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ DENSITIES = ("histogram", "gaussian", "mixture")
 
 @dataclass(frozen=True)
 class Watched:
-    """What an estimator said of every frame in which neither car had reached the merging point.
+    """Output of an estimator for every frame in which neither car had reached the merging point.
 
     Attributes:
         log_odds: Log-odds of NOT_YIELD, shape (frames,).
@@ -54,7 +54,7 @@ class Watched:
 
 
 def open_loop(estimator: Estimator, encounters: Encounters, seed: int = 0) -> Watched:
-    """Let an estimator watch the logs, without driving."""
+    """Run an estimator on the logs, without driving."""
     log, n = encounters.log, len(encounters)
     assert log is not None
     estimator.start(n, Setting())

@@ -1,4 +1,4 @@
-"""The soonest that a host can pass behind a logged merging car: a dynamic programme over time, speed and station.
+"""The earliest pass of a host behind a logged merging car: a dynamic programme over time, speed and station.
 
 The host must stay below station 0 until it arrives, and from then on, for the scored horizon, behind the merging car's
 rear bumper. For a given cycle of arrival these conditions are convex in the accelerations, so that at each cycle and
@@ -39,7 +39,7 @@ class Ahead:
 
     @classmethod
     def of(cls, encounters: Encounters, row: int, rules: Rules) -> Ahead:
-        """Take the log of one encounter; past its end he goes on at his last speed."""
+        """Take the log of one encounter; after its end the merging car keeps its last speed."""
         assert encounters.log is not None
         logged = encounters.log.merging_station[row]
         cycles, horizon = rules.time_out_cycles, rules.horizon_cycles

@@ -1,4 +1,4 @@
-"""Training a model from a site's pairs, and judging it on merging cars it has never seen."""
+"""Training a model from a site's pairs, and judging it on merging cars not trained on."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def test_a_road_that_turns_back_is_told(tmp_path: Path) -> None:
         (
             'ramp = ["ramp", "weave"]\nmerging_lane = [0, 0]',
             'ramp = ["ramp", "weave", "main_out"]\nmerging_lane = [0, 0, 1]',
-            "ramp: the auxiliary lane goes on to the road's end: nobody has to merge",
+            "ramp: the auxiliary lane goes on to the road's end: no car has to merge",
         ),
         (
             'ramp = ["ramp", "weave"]',

@@ -56,9 +56,9 @@ class IntentionModel:
     """What was learned from training pairs; index 0 is YIELD, index 1 NOT_YIELD.
 
     Attributes:
-        name: Short name, shown in every row that rests on it.
+        name: Short name, shown in every result row that used it.
         site, source: Where the training pairs come from.
-        trained_on: Keys of the training merging cars, sorted; nobody may be tested on them.
+        trained_on: Keys of the training merging cars, sorted; a test must not contain them.
         settings: How the pairs were chosen and split, for the reader.
         pairs: Number of pairs per intention, shape (2,).
         merge_speed: Mean speed of the training merging cars at their lane change [m/s].

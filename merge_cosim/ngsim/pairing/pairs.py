@@ -199,7 +199,7 @@ def _credible_end(tracks: Tracks, track: IntArray, change: IntArray, rules: Pair
 
 
 def _observed(tracks: Tracks, track: int, start: int, end: int, rules: PairRules) -> FloatArray:
-    """Speed [m/s] of a merging car as observed in rows `start` to `end`; the filter knows what came before them."""
+    """Speed [m/s] of a merging car as observed in rows `start` to `end`; the filter uses earlier rows as well."""
     first = tracks.offsets[track]
     speed = tracks.speed[first:end]
     if rules.observed == "causal":

@@ -1,4 +1,4 @@
-"""Scenes: all logged cars of one recording together, as they drove beside, before and behind each other.
+"""Scenes: all logged cars of one recording together, at their logged places.
 
 Positions are smoothed and frames counted as for the pairs, so that host and merging car of an encounter have in their
 scene exactly the encounter's stations.

@@ -29,10 +29,10 @@ class Recipe:
         filmed_from: The on-ramp is filmed from here on [m past the gore].
         speed_factor: Spread of desired speeds: normal, mean, deviation, lowest, highest (as a factor of the limit).
         min_gap: Gap to the car ahead at standstill [m].
-        assertive: How small a gap a driver takes who must change lane (`lcAssertive`).
-        strategic: How early the driver wants to change (`lcStrategic`).
-        cooperative: How willing the driver is to make room (`lcCooperative`), 0 to 1.
-        speed_gain: How eager the driver is to change for a faster lane (`lcSpeedGain`).
+        assertive: How small a gap a driver accepts for a necessary lane change (`lcAssertive`).
+        strategic: How early a driver changes (`lcStrategic`).
+        cooperative: How willing a driver is to make room (`lcCooperative`), 0 to 1.
+        speed_gain: How eager a driver is to change to a faster lane (`lcSpeedGain`).
         change_time: Length of a lane change [s]; the car counts for the new lane from its middle on.
         drivers: The kinds of drivers.
     """

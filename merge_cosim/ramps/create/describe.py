@@ -1,4 +1,4 @@
-"""Describe the on-ramp of somebody's own net in a `ramp.toml` beside it; the net stays as it is."""
+"""Describe the on-ramp of a user's net in a `ramp.toml` beside it; the net stays as it is."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def definition_text(file: RampFile) -> str:
     rows = [
         f"title = {_toml(file.title)}",
         f"net = {_toml(file.net)}",
-        *(["described = true   # somebody's own net: it is neither built nor changed"] if file.described else []),
+        *(["described = true   # a net of its own: it is neither built nor changed"] if file.described else []),
         "",
         f"main = {_toml(file.main)}",
         f"host_lane = {_toml(file.host_lane)}   # SUMO counts from the right",

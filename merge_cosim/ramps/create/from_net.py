@@ -1,4 +1,4 @@
-"""Start a ramp of one's own from a SUMO net: the stretch around one on-ramp, to be edited and rebuilt."""
+"""Start a new ramp from a SUMO net: the stretch around one on-ramp, to be edited and rebuilt."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Start a ramp of one's own from an extract of OpenStreetMap: netconvert makes a net of it, by SUMO's own rules."""
+"""Start a new ramp from an extract of OpenStreetMap: netconvert makes a net of it, by SUMO's own rules."""
 
 from __future__ import annotations
 

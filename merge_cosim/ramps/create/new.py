@@ -1,4 +1,4 @@
-"""Start a ramp of one's own from a few numbers: straight roads, built at once, to be edited further."""
+"""Start a new ramp from a few numbers: straight roads, built at once, to be edited further."""
 
 from __future__ import annotations
 

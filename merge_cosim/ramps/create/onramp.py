@@ -1,4 +1,4 @@
-"""One on-ramp of a user's net: read the net, choose the on-ramp, and say in words what was found."""
+"""One on-ramp of a user's net: read the net, choose the on-ramp, and describe what was found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Start a ramp of one's own from whichever source the user has."""
+"""Start a new ramp from whichever source the user has."""
 
 from collections.abc import Mapping
 from pathlib import Path

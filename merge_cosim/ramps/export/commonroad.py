@@ -150,7 +150,7 @@ def _network(road: Mapping[str, Lanelet], ramp: Ramp, new_ids: Iterator[int]) ->
 
 
 def _kind(lanelet: Lanelet, ramp: Ramp) -> LaneletType:
-    """The way in, with its auxiliary lane; the main road; anything else begins or ends at the ramp and is a way out."""
+    """On-ramp with its auxiliary lane, main road, or exit (anything else that begins or ends at the ramp)."""
     from commonroad.scenario.lanelet import LaneletType
 
     if any((section.edge, section.lane) == (lanelet.edge, lanelet.lane) for section in ramp.ramp):

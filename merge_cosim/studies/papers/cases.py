@@ -1,4 +1,4 @@
-"""The named cases of the papers, driven again cycle by cycle."""
+"""The named cases of the papers, run again cycle by cycle."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be told"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What our results say of a claim.
+    """Our verdict on a claim.
 
     Attributes:
         word: `holds`, `does not hold` or `cannot be told`.
@@ -40,7 +40,7 @@ class Claim:
 
     Attributes:
         text: The claim.
-        paper: Who claims it.
+        paper: The paper that claims it.
         judge: Comes to a verdict.
     """
 

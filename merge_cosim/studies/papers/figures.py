@@ -1,4 +1,4 @@
-"""The papers' figures that no single sweep has: number of speed nodes, and who is on camera when."""
+"""The papers' figures that no single sweep has: number of speed nodes, and which cars are on camera when."""
 
 from __future__ import annotations
 

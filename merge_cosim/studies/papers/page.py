@@ -205,7 +205,7 @@ def _on_camera(data: Path | None) -> Part:
     us101 = site("us101")
     figure = figures.overlap_figure(data or surrogate_folder(us101), us101)
     caption = "Time on camera of a host, the car ahead of it, and the merging cars that change lane near it."
-    return Part("Who is on camera when (FG-GMM, Fig. 4)", pictures=[Picture.of(figure, caption)])
+    return Part("Which cars are on camera when (FG-GMM, Fig. 4)", pictures=[Picture.of(figure, caption)])
 
 
 def _particle_filter() -> Part:
@@ -213,12 +213,12 @@ def _particle_filter() -> Part:
     pictures = [
         Picture.of(
             belief_figures.clouds_figure(model),
-            "Particles before, between and after one update: a driver who has begun to accelerate.",
+            "Particles before, between and after one update: a driver that has begun to accelerate.",
             wide=True,
         ),
         Picture.of(
             belief_figures.belief_figure(model),
-            "The belief over 12 s: a driver who stays behind, and one who pulls ahead from 5 s on.",
+            "The belief over 12 s: a driver that stays behind, and one that pulls ahead from 5 s on.",
             wide=True,
         ),
         Picture.of(
