@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 import sumolib
@@ -22,14 +22,6 @@ from merge_cosim.ramps.definition import FILE_NAME, NgsimMapping, RampFile, read
 
 Way = Literal["main", "ramp"]
 """The host's path and the merging car's."""
-
-
-class LanePosition(NamedTuple):
-    """A place in the net: the front bumper at `position` metres from the start of lane `lane` of `edge`."""
-
-    edge: str
-    lane: int
-    position: float
 
 
 @dataclass(frozen=True)
@@ -162,54 +154,12 @@ class Ramp:
         outgoing = read_net(self.net).getEdge(edge).getLane(lane).getOutgoing()
         return tuple(sorted({str(link.getTo().getID()) for link in outgoing}))
 
-    def host_lane_on(self, edge: str) -> int:
-        """SUMO index of the host's lane on an edge of the main road."""
-        for section in self.main:
-            if section.edge == edge:
-                return section.lane
-        raise ValueError(f"{self.name}: '{edge}' is no edge of the main road; these are {', '.join(self.main_route)}")
-
     def holds(self, merge_position: FloatArray, host_station: FloatArray, merging_station: FloatArray) -> BoolArray:
         """Which encounters fit: merging point beside the ramp's lane, both starts on the net; shape (n,)."""
         beside = (merge_position >= 0.0) & (merge_position <= self.auxiliary_end)
         host, merging = host_station + merge_position, merging_station + merge_position
         on_net = (host >= self.main[0].start) & (merging >= self.ramp[0].start) & (host < self.downstream)
         return np.asarray(beside & on_net)
-
-    def place(self, path: Way, station: float, merge_position: float) -> LanePosition:
-        """Where a front bumper at `station` [m] lies in the net.
-
-        On the path `ramp` that is the on-ramp, then the auxiliary lane, and from station 0 on the host lane.
-
-        Raises:
-            UserError: The place or the merging point is off the net; the line names the reach.
-        """
-        x = station + merge_position
-        if not 0.0 <= merge_position <= self.auxiliary_end:
-            raise UserError(
-                f"ramp {self.name}: the merging point {merge_position:.1f} m past the gore is off the auxiliary lane "
-                f"(0 ... {self.auxiliary_end:.1f} m)"
-            )
-        ahead_of_change = path == "ramp" and (x < 0.0 or (station < 0.0 and self.changes_lane))
-        for section in reversed(self.ramp if ahead_of_change else self.main):
-            if section.start <= x <= section.end:
-                return LanePosition(section.edge, section.lane, x - section.start)
-        start = (self.ramp if path == "ramp" else self.main)[0].start
-        raise UserError(
-            f"ramp {self.name}: station {station:.1f} m on the path '{path}' is off the net, which reaches from "
-            f"{start - merge_position:.1f} to {self.downstream - merge_position:.1f} m"
-        )
-
-    def station(self, edge: str, lane: int, position: float, merge_position: float) -> float:
-        """Station [m] of a front bumper `position` metres from the start of any lane of a named edge.
-
-        The inverse of `place`. All lanes of an edge share one coordinate, so `lane` only completes the SUMO place.
-        """
-        for section in self.main + self.ramp:
-            if section.edge == edge:
-                return section.start + position - merge_position
-        named = ", ".join(dict.fromkeys(self.main_route + self.ramp_route))
-        raise ValueError(f"ramp {self.name}: '{edge}' (lane {lane}) is on neither path; these have {named}")
 
 
 def ramp_names() -> list[str]:

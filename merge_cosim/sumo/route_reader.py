@@ -14,6 +14,7 @@ from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.sumo.configuration import Configuration, parse
+from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 from merge_cosim.sumo.vehicle_types import MERGE_POSITION, ROLE
 
 ROLES = ("host", "merging")
@@ -82,10 +83,10 @@ def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
 
 
 def _stations(ramp: Ramp, cars: list[_Car], merge_position: np.ndarray, file: Path) -> np.ndarray:
-    stations = []
+    lanes, stations = LaneMap(ramp), []
     for car, merging_point in zip(cars, merge_position, strict=True):
         try:
-            stations.append(ramp.station(car.edge, 0, car.position, float(merging_point)))
+            stations.append(lanes.station(LanePosition(car.edge, 0, car.position), float(merging_point)))
         except ValueError as error:
             raise UserError(f"{file}: vehicle '{car.name}': {error}") from None
     return np.array(stations)

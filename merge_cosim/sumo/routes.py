@@ -11,6 +11,7 @@ from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import FILE_NAME as VIEW
 from merge_cosim.ramps.view import copy_view
+from merge_cosim.sumo.lane_map import LaneMap
 from merge_cosim.sumo.options import STEP, WRITTEN, Options
 from merge_cosim.sumo.vehicle_types import COLORS, CONTROLLED, MERGE_POSITION, ROLE
 from merge_cosim.sumo.xml import element, number, write_xml
@@ -34,7 +35,7 @@ def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) 
     }
     types, cars = [], []
     for role, (station, speed, length) in states.items():
-        where = ramp.place("main" if role == "host" else "ramp", float(station[row]), merge_position)
+        where = LaneMap(ramp).place("main" if role == "host" else "ramp", float(station[row]), merge_position)
         route = ramp.main_route if role == "host" else ramp.ramp_route
         parameters = {ROLE: role} | ({MERGE_POSITION: number(merge_position)} if role == "merging" else {})
         kind = replace(CONTROLLED, id=role, length=float(length[row]), color=COLORS[role], parameters=parameters)

@@ -30,6 +30,7 @@ from merge_cosim.scenarios.scenario import Scenario, load_scenario
 from merge_cosim.scenarios.settings import split_settings
 from merge_cosim.scenarios.sources import Routes, Traffic
 from merge_cosim.sumo.configuration import Configuration
+from merge_cosim.sumo.lane_map import LaneMap
 from merge_cosim.sumo.vehicle_types import ROLE
 from merge_cosim.sweeps.full_scene_task import SceneReplay, load_scenes
 from merge_cosim.sweeps.scene_task import SceneBatch
@@ -241,8 +242,9 @@ def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters
     fits = ramp.holds(encounters.merge_position, encounters.host_station, encounters.merging_station)
     if not fits.any():
         merge_position = float(encounters.merge_position[0])
-        ramp.place("main", float(encounters.host_station[0]), merge_position)
-        ramp.place("ramp", float(encounters.merging_station[0]), merge_position)
+        lanes = LaneMap(ramp)
+        lanes.place("main", float(encounters.host_station[0]), merge_position)
+        lanes.place("ramp", float(encounters.merging_station[0]), merge_position)
     return _taken(encounters, np.flatnonzero(fits)), tuple(encounters.case[~fits].tolist())
 
 

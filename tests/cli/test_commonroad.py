@@ -17,6 +17,7 @@ from merge_cosim.ramps.export.commonroad import need_library
 from merge_cosim.ramps.export.lanelets import lanelets
 from merge_cosim.ramps.export.poses import SIDEWAYS, poses
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 
 pytest.importorskip("commonroad")
 
@@ -65,7 +66,7 @@ class Exported:
         (step,) = [step for step in self.fcd if float(step.time) == row["time_s"]]
         (host,) = [car for car in step.vehicle if car.id == "t0.host"]
         edge, _, lane = host.lane.removeprefix("t0.").rpartition("_")
-        return self.ramp.station(edge, int(lane), float(host.pos), 0.0) - row["host_station_m"]
+        return LaneMap(self.ramp).station(LanePosition(edge, int(lane), float(host.pos)), 0.0) - row["host_station_m"]
 
 
 @pytest.fixture(scope="module", params=CASES)

@@ -15,6 +15,7 @@ import sumolib
 from command import merge_cosim, refused
 
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 from merge_cosim.sweeps.plan import SweepRequest, plan
 
 OUTPUTS = ("fcd", "ssm", "lanechange", "tripinfo", "collisions")
@@ -43,7 +44,7 @@ def check_fcd(folder, ramp, merge_position, trace):
                 continue
             row, name = trace[times[-1]], car.id.removeprefix("t0.")
             edge, _, lane = car.lane.removeprefix("t0.").rpartition("_")
-            station = ramp.station(edge, int(lane), float(car.pos), merge_position)
+            station = LaneMap(ramp).station(LanePosition(edge, int(lane), float(car.pos)), merge_position)
             assert station == pytest.approx(float(row[f"{name}_station_m"]), abs=ROUNDING)
             # ours is the way over the time: six decimals of a position are five of a speed
             assert float(car.speed) == pytest.approx(float(row[f"{name}_speed_m_s"]), abs=2e-5)
@@ -152,7 +153,7 @@ def test_fcd_of_a_scene_has_all_cars_and_the_record_of_its_meetings(scene):
             edge, _, lane = car.lane.rpartition("_")
             cars.add(car.id)
             if car.id.startswith(("host", "merging")):
-                place = ramp.station(edge, int(lane), float(car.pos), 0.0)
+                place = LaneMap(ramp).station(LanePosition(edge, int(lane), float(car.pos)), 0.0)
                 seen[float(step.time), car.id] = (place, float(car.speed))
     assert len(cars) == facts["vehicles"]
     assert len(record) > 50

@@ -3,13 +3,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
 from merge_cosim.ngsim.sites import shipped_sites
-from merge_cosim.ramps.ramp import LanePosition, Ramp, ramp_names
+from merge_cosim.ramps.ramp import Ramp, ramp_names
+from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 
 NAMES = ("designed", "i80", "us101")
 
@@ -36,9 +35,6 @@ def test_designed_ramp_joins_by_a_connection() -> None:
     assert ramp.merging_point == 0.0
     assert ramp.main_route == ("main_in", "main_out")
     assert ramp.ramp_route == ("ramp", "main_out")
-    assert ramp.place("main", -90.0, 0.0) == LanePosition("main_in", 0, 410.0)
-    assert ramp.place("ramp", -90.0, 0.0) == LanePosition("ramp", 0, 410.0)
-    assert ramp.place("ramp", 0.0, 0.0) == LanePosition("main_out", 0, 0.0)
 
 
 def test_us101_has_an_auxiliary_lane() -> None:
@@ -46,32 +42,6 @@ def test_us101_has_an_auxiliary_lane() -> None:
     assert ramp.changes_lane
     assert ramp.auxiliary_end == pytest.approx(213.0)
     assert ramp.ramp_route == ("ramp", "weave", "main_out")
-    assert [ramp.host_lane_on(edge) for edge in ramp.main_route] == [0, 1, 0]
-    assert ramp.place("main", -42.0, 42.0) == LanePosition("weave", 1, 0.0)
-    assert ramp.place("ramp", -50.0, 42.0) == LanePosition("ramp", 0, 492.0)
-    assert ramp.place("ramp", -12.0, 42.0) == LanePosition("weave", 0, 30.0)
-    assert ramp.place("ramp", 8.0, 42.0) == LanePosition("weave", 1, 50.0)
-    assert ramp.place("ramp", 200.0, 42.0) == LanePosition("main_out", 0, 29.0)
-    assert ramp.station("weave", 0, 30.0, 42.0) == -12.0
-    with pytest.raises(ValueError, match="'ramp' is no edge of the main road"):
-        ramp.host_lane_on("ramp")
-
-
-@given(
-    name=st.sampled_from(NAMES),
-    path=st.sampled_from(("main", "ramp")),
-    station=st.floats(-400.0, 1400.0),
-    share=st.floats(0.0, 1.0),
-)
-def test_station_is_the_inverse_of_place(name: str, path: str, station: float, share: float) -> None:
-    ramp = Ramp.load(name)
-    merge_position = share * (ramp.auxiliary_end if ramp.changes_lane else 0.0)
-    if station + merge_position > ramp.downstream:
-        return
-    place = ramp.place(path, station, merge_position)
-    assert ramp.station(*place, merge_position) == pytest.approx(station, abs=1e-9)
-    if path == "main" or station >= 0.0:
-        assert place.lane == ramp.host_lane_on(place.edge)
 
 
 def test_edges_of_awkward_lengths_end_exactly_at_the_gore(tmp_path: Path) -> None:
@@ -92,19 +62,7 @@ def test_edges_of_awkward_lengths_end_exactly_at_the_gore(tmp_path: Path) -> Non
     # The on-ramp reaches further back than the main road: each car needs room on its own path.
     stations = np.array([-400.0, -500.2])
     assert ramp.holds(np.zeros(2), stations, stations[::-1]).tolist() == [True, False]
-    assert ramp.place("ramp", 0.0, 0.0) == LanePosition("main_out", 0, 0.0)
-
-
-def test_off_the_net_names_the_reach() -> None:
-    ramp = Ramp.load("us101")
-    with pytest.raises(UserError, match=r"reaches from -542.0 to 1458.0 m"):
-        ramp.place("main", -543.0, 42.0)
-    with pytest.raises(UserError, match="off the auxiliary lane"):
-        ramp.place("ramp", 0.0, 214.0)
-    with pytest.raises(UserError, match="off the auxiliary lane"):
-        ramp.place("ramp", 0.0, -1.0)
-    with pytest.raises(ValueError, match="on neither path"):
-        ramp.station("exit", 0, 3.0, 42.0)
+    assert LaneMap(ramp).place("ramp", 0.0, 0.0) == LanePosition("main_out", 0, 0.0)
 
 
 def test_unknown_name_lists_the_choices() -> None:

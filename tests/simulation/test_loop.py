@@ -15,6 +15,7 @@ from merge_cosim.scoring.scoring import Rules
 from merge_cosim.simulation.host_driver import HostDriver
 from merge_cosim.simulation.loop import Run, simulate
 from merge_cosim.simulation.worlds.tiles import ClosedFormWorld, TiledWorld
+from merge_cosim.sumo.lane_map import LaneMap
 
 
 def run(world, encounters: Encounters, method: str, traced=()) -> Run:
@@ -68,7 +69,7 @@ def test_speeds_are_those_that_sumo_reports(ramp, merge_position):
                     lanes = [libsumo.vehicle.getLaneID(f"t{tile}.merging") for tile in range(16)]
                     edges = [lane.partition(".")[2].rpartition("_")[0] for lane in lanes]
                     in_host_lane = [
-                        edge in road.main_route and lane.endswith(f"_{road.host_lane_on(edge)}")
+                        edge in road.main_route and lane.endswith(f"_{LaneMap(road).host_lane(edge)}")
                         for lane, edge in zip(lanes, edges, strict=True)
                     ]
                     np.testing.assert_array_equal(in_host_lane, world.state[1] >= -1e-6)

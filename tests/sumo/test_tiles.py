@@ -13,6 +13,7 @@ import pytest
 import sumolib
 
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 from merge_cosim.sumo.tiles import tile_id, tile_net
 
 ALL = ("designed", "i80", "us101")
@@ -49,7 +50,7 @@ def drive(ramp: Ramp, tile: str, seed: int, cycles: int = 250) -> float:
     speed = {car: float(rng.uniform(0.0, 28.0)) for car in CARS}
     start, odometer = dict(station), {}
     for car, path in zip(CARS, ("main", "ramp"), strict=True):
-        where = ramp.place(path, station[car], merge_position)
+        where = LaneMap(ramp).place(path, station[car], merge_position)
         libsumo.vehicle.moveTo(car, f"{tile}{where.edge}_{where.lane}", where.position)
         libsumo.vehicle.setPreviousSpeed(car, speed[car])
         odometer[car] = libsumo.vehicle.getDistance(car)
@@ -60,18 +61,18 @@ def drive(ramp: Ramp, tile: str, seed: int, cycles: int = 250) -> float:
             libsumo.vehicle.setSpeed(car, speed[car])
         if not changed and station["merging"] + speed["merging"] * 0.1 >= 0.0:
             edge = libsumo.vehicle.getRoadID("merging").removeprefix(tile)
-            libsumo.vehicle.changeLane("merging", ramp.host_lane_on(edge), 0.0)
+            libsumo.vehicle.changeLane("merging", LaneMap(ramp).host_lane(edge), 0.0)
         libsumo.simulationStep()
         for car in CARS:
             station[car] += speed[car] * 0.1
             edge = libsumo.vehicle.getRoadID(car).removeprefix(tile)
             lane, position = libsumo.vehicle.getLaneIndex(car), libsumo.vehicle.getLanePosition(car)
-            seen = ramp.station(edge, lane, position, merge_position)
+            seen = LaneMap(ramp).station(LanePosition(edge, lane, position), merge_position)
             driven = libsumo.vehicle.getDistance(car) - odometer[car]
             worst = max(worst, abs(seen - station[car]), abs(driven - (station[car] - start[car])))
             worst = max(worst, abs(libsumo.vehicle.getSpeed(car) - speed[car]))
         if not changed and station["merging"] >= 0.0:
-            assert lane == ramp.host_lane_on(edge), "the lane change acts within the step"
+            assert lane == LaneMap(ramp).host_lane(edge), "the lane change acts within the step"
             changed = True
     return worst
 
@@ -108,7 +109,7 @@ def test_a_lane_change_may_be_asked_for_just_before_the_auxiliary_lane_begins() 
     with running(tile_net(ramp, 1), ramp, tile_id(0, "")):
         libsumo.vehicle.moveTo("merging", tile_id(0, "ramp_0"), 499.5)
         libsumo.vehicle.setSpeed("merging", 20.0)
-        libsumo.vehicle.changeLane("merging", ramp.host_lane_on("weave"), 0.0)
+        libsumo.vehicle.changeLane("merging", LaneMap(ramp).host_lane("weave"), 0.0)
         libsumo.simulationStep()
         assert libsumo.vehicle.getLaneID("merging") == tile_id(0, "weave_1")
         assert libsumo.vehicle.getLanePosition("merging") == pytest.approx(1.5, abs=1e-12)

@@ -16,6 +16,7 @@ from merge_cosim.ngsim.rows import FRAME_MS
 from merge_cosim.ngsim.sites import Site
 from merge_cosim.ngsim.surrogate.recipe import Recipe
 from merge_cosim.ramps.ramp import Ramp, read_net
+from merge_cosim.sumo.lane_map import LaneMap
 
 DECIMALS = 3
 """NGSIM gives positions and speeds with so many decimals [ft, ft/s]."""
@@ -40,9 +41,9 @@ def ngsim_rows(trajectories: Path, recipe: Recipe, ramp: Ramp, site: Site, recor
     named = ["vehicle_id", "vehicle_type", "vehicle_lane"]
     run = pq.read_table(trajectories, read_dictionary=named).to_pandas()
     numbers = {lane: number for number, along in ramp.ngsim.lanes.items() for lane in along}
-    starts = {section.edge: section.start for section in (*ramp.main, *ramp.ramp)}
+    lanes = LaneMap(ramp)
     lane = _each(run["vehicle_lane"], numbers.__getitem__)
-    before = _each(run["vehicle_lane"], lambda name: starts.get(name.rpartition("_")[0], ramp.auxiliary_end))
+    before = _each(run["vehicle_lane"], lambda name: lanes.start(name.rpartition("_")[0]))
     x = run["vehicle_pos"].to_numpy() + before
     y = x + ramp.ngsim.gore_local_y
     filmed = (y >= 0) & (y <= site.length) & ~(np.isin(lane, site.ramp_lanes) & (x < recipe.filmed_from))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from merge_cosim.scoring.tracks import DECIMALS
-from merge_cosim.sumo.lanes import Part, RampLane, RampLanes
+from merge_cosim.sumo.lane_map import LaneMap, Part, RampLane
 from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.vehicle_types import ROLE
 
@@ -60,7 +60,7 @@ class Actors:
         came: Names of all hosts that have come in so far.
     """
 
-    def __init__(self, session: Session, lanes: RampLanes, host: str = "") -> None:
+    def __init__(self, session: Session, lanes: LaneMap, host: str = "") -> None:
         self._session = session
         self._lanes = lanes
         self._host = host

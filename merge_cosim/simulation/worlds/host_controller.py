@@ -18,7 +18,7 @@ from merge_cosim.simulation.worlds.actors import Actor, Actors
 from merge_cosim.simulation.worlds.meetings import DEFAULT_ATTENTION, Attention, Ending, Meeting
 from merge_cosim.simulation.worlds.notes import Event, Notes
 from merge_cosim.simulation.worlds.slots import SlotBatch
-from merge_cosim.sumo.lanes import Part, RampLanes
+from merge_cosim.sumo.lane_map import LaneMap, Part
 from merge_cosim.sumo.session import Session
 
 
@@ -65,7 +65,7 @@ class HostController:
         self._horizon = round(horizon / setting.dt)
         controller = driver.controller
         self._law: FollowingLaw = controller if isinstance(controller, FollowingLaw) else Acc()
-        self._actors = Actors(session, RampLanes(ramp), host)
+        self._actors = Actors(session, LaneMap(ramp), host)
         self._batches: list[SlotBatch] = []
         self._open: dict[Meeting, SlotBatch] = {}
         self._met: dict[str, set[str]] = {}

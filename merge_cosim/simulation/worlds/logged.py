@@ -22,9 +22,8 @@ from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import view_options
 from merge_cosim.scoring.surroundings import SIGHT, InLane, Neighbours
 from merge_cosim.simulation.host_driver import HostDriver
-from merge_cosim.simulation.worlds.logged_lanes import Roadway
 from merge_cosim.simulation.worlds.logged_rules import FullScene
-from merge_cosim.simulation.worlds.logged_traffic import LoggedTraffic
+from merge_cosim.simulation.worlds.logged_traffic import LoggedTraffic, logged_road
 from merge_cosim.simulation.worlds.tiles import COLORS
 from merge_cosim.sumo.options import LOGGED, SumoOptions, delay_option
 from merge_cosim.sumo.start import open_session
@@ -78,7 +77,7 @@ class LoggedWorld:
         self.around = {name: np.full(len(places), np.inf) for name in AROUND}
         self.facts: dict[int, dict[str, Any]] = {}
         self._ramp, self._places, self._rules = ramp, places, rules
-        self._road, self._gui = Roadway(ramp), gui_delay is not None
+        self._road, self._gui = logged_road(ramp), gui_delay is not None
         self._folder = tempfile.TemporaryDirectory(prefix="merge-cosim-")
         types = Path(self._folder.name) / "types.add.xml"
         rules.drivers.write(types)

@@ -9,9 +9,10 @@ import numpy as np
 
 from merge_cosim.core.units import DT, BoolArray, FloatArray, IntArray
 from merge_cosim.ngsim.pairing.recordings import LoggedScene
+from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.simulation.worlds.logged_lanes import Roadway, Strip
 from merge_cosim.simulation.worlds.nearness import Places, in_conflict, near
+from merge_cosim.sumo.logged_road import LoggedRoad, Strip
 from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.vehicle_types import LOGGED_TYPE, ReleasedDrivers
 
@@ -47,7 +48,7 @@ class LoggedTraffic:
             UserError: A log leads off the net.
         """
         self._session, self._scene, self._drivers = session, scene, drivers or ReleasedDrivers()
-        self._road = Roadway(ramp)
+        self._road = logged_road(ramp)
         self._strip = self._road.find(scene.lane, scene.x)
         self._way = _ways(scene)
         self._names: list[str] = scene.car.tolist()
@@ -221,6 +222,16 @@ class LoggedTraffic:
                 places.append((strip.lane, x, self._scene.length[car], session.speed(name)))
         lane, *state = np.array(places).reshape(-1, 4).T
         return cars, Places(lane.astype(np.int64), *state)
+
+
+def logged_road(ramp: Ramp) -> LoggedRoad:
+    """Where the lanes of the recording at a ramp lie in its net.
+
+    Raises:
+        UserError: Nothing was recorded at the ramp, or its file does not say where the lanes lie.
+    """
+    site = find_site(ramp.net.parent)
+    return LoggedRoad(ramp, site.ramp_lanes, site.exit_lanes, site.host_lane)
 
 
 def _ways(scene: LoggedScene) -> FloatArray:

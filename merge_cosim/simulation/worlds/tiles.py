@@ -10,7 +10,8 @@ import numpy as np
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
-from merge_cosim.ramps.ramp import LanePosition, Ramp, Way
+from merge_cosim.ramps.ramp import Ramp, Way
+from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, LanePosition
 from merge_cosim.sumo.options import SumoOptions
 from merge_cosim.sumo.session import Car, Session
 from merge_cosim.sumo.start import LibsumoSession
@@ -101,13 +102,7 @@ class TiledWorld:
             Car(name, tuple(self._id(row % count, edge) for edge in routes[row // count]), COLORS[row // count])
             for name, row in self._row.items()
         )
-        start = {section.edge: section.start for section in ramp.main + ramp.ramp}
-        self._starts = np.array([start[edge] for route in routes for edge in route])
-        self._edge_number = [{edge: i for i, edge in enumerate(routes[0])}]
-        self._edge_number += [{edge: i + len(routes[0]) for i, edge in enumerate(routes[1])}]
-        self._edge = np.repeat([0, len(routes[0])], count)
-        self._edge_start = self._starts[self._edge]
-        self._position = np.zeros(2 * count)
+        self._lanes, self._along = LaneMap(ramp), AlongPaths(ramp, count)
         self._merge_position = np.zeros(2 * count)
         self._length = np.full(2 * count, np.nan)
         self._in_host_lane = np.ones(count, dtype=bool)
@@ -126,14 +121,12 @@ class TiledWorld:
             self._merge_position[rows] = merge_position
             values = zip(rows.tolist(), merge_position.tolist(), *start[car::2].tolist(), strict=True)
             for row, position, station, speed, length in values:
-                self._place(row, self.ramp.place(path, station, position), speed, length)
+                self._place(row, self._lanes.place(path, station, position), speed, length)
 
     def _place(self, row: int, where: LanePosition, speed: float, length: float) -> None:
         name = self._names[row]
         self.session.place(name, self._id(row % self.count, f"{where.edge}_{where.lane}"), where.position, speed)
-        self._edge[row] = self._edge_number[row // self.count][where.edge]
-        self._edge_start[row] = self._starts[self._edge[row]]
-        self._position[row] = where.position
+        self._along.put(row, where)
         if self._length[row] != length:
             self.session.set_length(name, length)
             self._length[row] = length
@@ -152,18 +145,13 @@ class TiledWorld:
         """Command the lane changes of this cycle; `reached` are the merging cars' stations at its end [m]."""
         arrives = ~self._in_host_lane & (reached >= -TOLERANCE)
         for tile in np.flatnonzero(arrives).tolist():
-            edge = self.ramp.place("main", max(float(reached[tile]), 0.0), float(self._merge_position[tile])).edge
-            self.session.change_lane(self._names[tile + self.count], self.ramp.host_lane_on(edge))
+            edge = self._lanes.place("main", max(float(reached[tile]), 0.0), float(self._merge_position[tile])).edge
+            self.session.change_lane(self._names[tile + self.count], self._lanes.host_lane(edge))
         self._in_host_lane |= arrives
 
     def _read(self) -> None:
         position = np.fromiter(self.session.positions(self._names), np.float64, 2 * self.count)
-        crossed = np.flatnonzero(position < self._position)  # cars never back up, so this is the next edge's
-        if len(crossed):
-            self._edge[crossed] += 1
-            self._edge_start[crossed] = self._starts[self._edge[crossed]]
-        self._position = position
-        station = (position + self._edge_start - self._merge_position).reshape(2, self.count)
+        station = (self._along.x(position) - self._merge_position).reshape(2, self.count)
         np.subtract(station, self.state[:2], out=self.state[2:])
         self.state[2:] /= DT
         self.state[:2] = station

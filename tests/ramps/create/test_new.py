@@ -8,7 +8,8 @@ import sumolib
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.check import check
 from merge_cosim.ramps.create.new import RampNumbers, new_ramp
-from merge_cosim.ramps.ramp import LanePosition, Ramp
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 from merge_cosim.sumo.tiles import tile_net
 
 
@@ -31,7 +32,7 @@ def test_what_comes_out_has_the_numbers(
     assert ramp.merging_point == merging_point
     assert (ramp.upstream, ramp.downstream) == (numbers.upstream, numbers.downstream)
     assert ramp.changes_lane == bool(numbers.acceleration_lane)
-    assert ramp.place("ramp", -20.0, merging_point) == place
+    assert LaneMap(ramp).place("ramp", -20.0, merging_point) == place
     net = sumolib.net.readNet(str(ramp.net))
     assert [net.getEdge(edge).getLaneNumber() for edge in ("main_in", "ramp", "main_out")] == [
         numbers.lanes,

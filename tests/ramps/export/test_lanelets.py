@@ -10,6 +10,7 @@ import sumo
 from merge_cosim.ramps.export.lanelets import lanelets
 from merge_cosim.ramps.export.poses import poses
 from merge_cosim.ramps.ramp import Ramp, Section, ramp_names, read_net
+from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 
 TAPERS = "merge_0"
 """The lane of I-80 that runs slantwise into its neighbour."""
@@ -77,11 +78,13 @@ def test_a_station_is_found_again_on_the_lanelets(ramp, path):
     further, _ = poses(road, ramp, path, stations + 1.0, 0.0, merge_position)
     ways = further - places
     assert ways[:, 0] * np.cos(headings) + ways[:, 1] * np.sin(headings) == pytest.approx(1.0, abs=0.05)
+    lanes = LaneMap(ramp)
     for station, place in zip(stations, places, strict=True):
-        lane = ramp.place(path, station, merge_position)
+        lane = lanes.place(path, station, merge_position)
         position, off = way_on(road[f"{lane.edge}_{lane.lane}"], place)
         assert off < 1e-6
-        assert ramp.station(lane.edge, lane.lane, position, merge_position) == pytest.approx(station, abs=1e-4)
+        seen = lanes.station(LanePosition(lane.edge, lane.lane, position), merge_position)
+        assert seen == pytest.approx(station, abs=1e-4)
 
 
 @pytest.mark.parametrize("name", ["us101", "i80"])

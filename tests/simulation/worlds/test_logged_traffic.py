@@ -14,8 +14,7 @@ from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.tracks import build_tracks
 from merge_cosim.ngsim.sites import site
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.simulation.worlds.logged_lanes import Roadway
-from merge_cosim.simulation.worlds.logged_traffic import LoggedTraffic
+from merge_cosim.simulation.worlds.logged_traffic import LoggedTraffic, logged_road
 from merge_cosim.sumo.options import LOGGED, SumoOptions
 from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.start import LibsumoSession
@@ -24,7 +23,7 @@ from merge_cosim.sumo.vehicle_types import ReleasedDrivers
 US101 = site("us101")
 
 RAMP = Ramp.load("us101")
-ROAD = Roadway(RAMP)
+ROAD = logged_road(RAMP)
 
 
 def scene_of(*cars: Car) -> LoggedScene:

@@ -1,23 +1,24 @@
-"""Where NGSIM's lanes lie in a ramp's net: from lane number and x to SUMO's lane and position, and back."""
+"""Where a recording's lanes lie in a ramp's net: from lane number and x to SUMO's lane and position, and back."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import FloatArray, IntArray
-from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp, read_net
+from merge_cosim.sumo.lane_map import LaneMap
 
 
 class Strip(NamedTuple):
-    """A SUMO lane as a piece of one of NGSIM's lanes.
+    """A SUMO lane as a piece of one of the recording's lanes.
 
     Attributes:
-        lane: NGSIM's number, that of the first on-ramp lane for all lanes beside the main road.
+        lane: The recording's number, that of the first on-ramp lane for all lanes beside the main road.
         edge: SUMO's edge.
         lane_index: Index of the lane on it.
         start: x of its start [m past the gore].
@@ -36,36 +37,40 @@ class Strip(NamedTuple):
         return f"{self.edge}_{self.lane_index}"
 
 
-class Roadway:
-    """All strips of an NGSIM ramp, laid along the road as `ngsim.lanes` in its `ramp.toml` says.
+class LoggedRoad:
+    """All strips of a recorded ramp, laid along the road as `ngsim.lanes` in its `ramp.toml` says.
 
     Attributes:
         strips: Sorted by lane and start.
         side_lane: Number of the lanes beside the main road.
     """
 
-    def __init__(self, ramp: Ramp) -> None:
+    def __init__(self, ramp: Ramp, ramp_lanes: Sequence[int], exit_lanes: Sequence[int], host_lane: int) -> None:
         """Read a ramp.
 
+        Args:
+            ramp: The ramp.
+            ramp_lanes: The recording's numbers of the lanes from which cars merge.
+            exit_lanes: Those of the lanes that go on from these to an off-ramp.
+            host_lane: That of the lane that cars merge into.
+
         Raises:
-            UserError: The ramp is of no NGSIM site.
+            UserError: The ramp's file does not say where a recording's lanes lie.
         """
         if ramp.ngsim is None:
             raise UserError(f"{ramp.net.parent / FILE_NAME}: no [ngsim] table says where logged lanes lie in the net")
-        site = find_site(ramp.net.parent)
-        net = read_net(ramp.net)
-        starts = {section.edge: section.start for section in (*ramp.main, *ramp.ramp)}
+        net, lanes = read_net(ramp.net), LaneMap(ramp)
         strips = []
         for number, along in ramp.ngsim.lanes.items():
-            lane = site.ramp_lanes[0] if number in site.side_lanes else number
+            lane = ramp_lanes[0] if number in (*ramp_lanes, *exit_lanes) else number
             for name in along:
                 edge, _, index = name.rpartition("_")
-                start = starts.get(edge, ramp.auxiliary_end)  # the off-ramp starts where the auxiliary lane ends
+                start = lanes.start(edge)
                 strips.append(Strip(lane, edge, int(index), start, start + float(net.getEdge(edge).getLength())))
         self.strips = sorted(strips, key=lambda strip: (strip.lane, strip.start))
-        self.side_lane = site.ramp_lanes[0]
-        self._host_lane = site.host_lane
-        self._has_exit = bool(site.exit_lanes)
+        self.side_lane = ramp_lanes[0]
+        self._host_lane = host_lane
+        self._has_exit = bool(exit_lanes)
         self._ramp = ramp
         self._by_id = {strip.id: strip for strip in self.strips}
         self._follows = {
@@ -80,7 +85,7 @@ class Roadway:
         A car that keeps to the side lane beyond its end, where no off-ramp goes on from it, counts for the lane beside.
 
         Args:
-            lane: NGSIM's lane numbers, those beside the main road with the number of the first on-ramp lane.
+            lane: The recording's lane numbers, those beside the main road with the number of the first on-ramp lane.
             x: Front bumpers [m past the gore], same shape.
 
         Raises:
