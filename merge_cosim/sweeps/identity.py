@@ -24,6 +24,14 @@ def identity(request: SweepRequest, tasks: Sequence[Task]) -> dict[str, Any]:
         "versions": software(),
         "seed": request.seed,
         "methods": method_names(request, tasks),
+        "parameters": {
+            " ".join(filter(None, (task.method.name, task.variation))): {
+                name: value if isinstance(value, int | float | str) else str(value)
+                for name, value in task.method.parameters().items()
+            }
+            for task in tasks
+        },
+        "sources": {task.method.name: source for task in tasks if (source := task.method.source())},
         "against": request.against,
         "settings": {key: str(value) for key, value in request.settings.items()},
         "variations": [[name, [str(value) for value in values]] for name, values in request.variations],
