@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 import typer
 
@@ -38,12 +39,6 @@ app.add_typer(results.app)
 app.add_typer(lists.app)
 app.add_typer(ngsim.app, name="ngsim")
 app.add_typer(ramp.app, name="ramp")
-
-SHOWN = (
-    *("scenario", "variation", "site", "source", "method", "n", "failures", "failure_pct", "ci_low_pct", "ci_high_pct"),
-    *("censored", "host_not_reached", "distance_m", "delay_s", "hardest_braking", "unnecessary_yields", "cycle_us"),
-)
-"""Columns of the summary that fit a terminal."""
 
 SHOWN_TRAFFIC = (
     *("scenario", "variation", "method", "scenes", "throughput_veh_h", "mean_speed", "time_loss_s", "hosts"),
@@ -98,45 +93,49 @@ def sweep(
     json: Json = False,
 ) -> None:
     """Run scenarios under methods and store one row per case."""
-    import os
-
-    from merge_cosim.cli.progress import resumable, sweep_progress
-    from merge_cosim.ngsim.data import find_data
+    from merge_cosim.api.results import SHOWN
+    from merge_cosim.api.sweep import sweep as run_sweep
+    from merge_cosim.cli.interrupts import resumable
+    from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
     from merge_cosim.scenarios.settings import parse_setting, parse_variation
-    from merge_cosim.sweeps.plan import SweepRequest
-    from merge_cosim.sweeps.sweep import sweep as run_sweep
 
-    request = SweepRequest(
-        scenarios=scenarios,
-        methods=method or (),
-        model=model,
-        settings=dict(map(parse_setting, set_ or ())),
-        variations=[parse_variation(text) for text in vary or ()],
-        data=find_data(data),
-        source=source,
-        seed=seed,
-        plugins=plugin or (),
-        jobs=jobs or os.cpu_count() or 1,
-        start=start,
-        dask=dask,
-        against=against,
-    )
-    how = f"what was finished is kept in {out}; go on with --resume"
-    with resumable(how), sweep_progress() as progress:
-        run_sweep(request, out, resume, progress)
-    from merge_cosim.results.store import MANIFEST, SUMMARY_JSON, ResultFolder
-
+    with resumable(f"what was finished is kept in {out}; go on with --resume"):
+        results = run_sweep(
+            scenarios,
+            method,
+            model=model,
+            settings=dict(map(parse_setting, set_ or ())),
+            vary=_joined(map(parse_variation, vary or ())),
+            data=data,
+            source=source,
+            seed=seed,
+            against=against,
+            plugins=plugin or (),
+            jobs=jobs,
+            start=start,
+            dask=dask,
+            out=out,
+            resume=resume,
+        )
     folder = ResultFolder(out)
     if json:
-        print_json({"summary": folder.read_json(SUMMARY_JSON), "manifest": folder.read_json(MANIFEST)})
+        print_json({"summary": folder.read_json(SUMMARY_JSON), "manifest": results.manifest})
     else:
         rows = [{name: row[name] for name in SHOWN} for row in folder.read_json(SUMMARY_JSON)]
         show_table(rows, f"{out}: {', '.join(scenarios)}")
         if traffic := folder.traffic():
             shown = [name for name in SHOWN_TRAFFIC if name in traffic[0]]
             show_table([{name: row[name] for name in shown} for row in traffic], "the traffic as a whole")
-    for line in folder.note_lines():
+    for line in results.notes():
         typer.echo(line, err=True)
+
+
+def _joined(varied: Iterable[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
+    """The values by name, where a name may have been given several times."""
+    values: dict[str, list[Any]] = {}
+    for name, some in varied:
+        values[name] = values.get(name, []) + some
+    return values
 
 
 @app.command()
@@ -164,26 +163,26 @@ def run(
     json: Json = False,
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
-    from merge_cosim.ngsim.data import find_data
+    from merge_cosim.api.run import run as run_case
     from merge_cosim.scenarios.settings import parse_setting
-    from merge_cosim.sumo.attach import Address
     from merge_cosim.sumo.outputs import SumoOutputs
-    from merge_cosim.sweeps.plan import SweepRequest
-    from merge_cosim.sweeps.single import run_single
 
-    request = SweepRequest(
-        scenarios=[scenario],
-        methods=[method],
+    row = run_case(
+        scenario,
+        case,
+        method,
         model=model,
         settings=dict(map(parse_setting, set_ or ())),
-        data=find_data(data),
+        data=data,
         source=source,
         seed=seed,
         plugins=plugin or (),
-    )
-    outputs = SumoOutputs(fcd, ssm, lanechange, tripinfo, collisions)
-    address = Address.parse(attach) if attach else None
-    row = run_single(request, case, delay if gui else None, trace, outputs, address)
+        gui=gui,
+        delay=delay,
+        trace=trace,
+        outputs=SumoOutputs(fcd, ssm, lanechange, tripinfo, collisions),
+        attach=attach,
+    ).row
     if json:
         print_json(row)
     else:

@@ -61,7 +61,8 @@ def reproduce(
     """Run every table and figure of the papers, ours beside theirs, into one HTML page; a second call goes on."""
     import os
 
-    from merge_cosim.cli.progress import resumable, sweep_progress
+    from merge_cosim.api.progress import sweep_progress
+    from merge_cosim.cli.interrupts import resumable
     from merge_cosim.ngsim.data import find_data
     from merge_cosim.studies.papers.page import write_reproduction
     from merge_cosim.studies.reproduction import reproduce as run_studies

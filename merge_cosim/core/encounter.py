@@ -7,10 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NEVER = 1 << 30
 """A cycle that is never reached."""
@@ -157,6 +161,31 @@ class Encounters:
         texts = {"site": site, "source": source, "car": ""}
         every: dict[str, FloatArray | float | str] = {**texts, **usual, **flags, **given}
         return cls(case, **{name: np.broadcast_to(value, len(case)) for name, value in every.items()}, log=None)
+
+    @classmethod
+    def from_frame(cls, frame: pd.DataFrame, *, sample: bool = False) -> Encounters:
+        """Encounters from initial states of one's own, to be handed to a sweep.
+
+        Example:
+            >>> import pandas as pd
+            >>> states = {"host_station": [-80.0], "host_speed": 20.0, "merging_station": -90.0, "merging_speed": 18.0}
+            >>> len(Encounters.from_frame(pd.DataFrame(states)))
+            1
+
+        Args:
+            frame: A row per case. Needed columns: `host_station`, `merging_station` [m], front bumpers along each
+                car's own path, 0 at the merging point and negative upstream; `host_speed`, `merging_speed` [m/s].
+                Optional: `case`, the names (`c0`, `c1`, ... if absent); `host_length`, `merging_length` [m] (5 m);
+                `merge_position`, where station 0 lies in metres along the main road past the ramp's gore (0).
+            sample: The states are a random sample, so that failure rates get confidence intervals.
+
+        Raises:
+            UserError: A column is missing or unknown, or a value cannot be.
+        """
+        from merge_cosim.core.frames import states_of
+
+        case, states = states_of(frame)
+        return cls.unlogged(case, "designed", "random" if sample else "designed", **states)
 
     def __len__(self) -> int:
         return len(self.case)

@@ -1,4 +1,4 @@
-"""Two result folders side by side: the same tests and methods, on the cases that both hold."""
+"""Two result folders or two methods side by side, on the cases that both hold."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import did_you_mean
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order, is_reference
 from merge_cosim.results.statistics.comparison import mcnemar
@@ -20,23 +21,28 @@ MEASURES = {"distance_m": "D m", "delay_s": "delay s", "hardest_braking": "brake
 """Measures whose means are set side by side, beside the failures."""
 
 
-def compare(first: Path, second: Path) -> tuple[Table, list[str]]:
-    """Set two result folders side by side.
+def compare(first: Path, second: Path, methods: tuple[str, str] | None = None) -> tuple[Table, list[str]]:
+    """Set two result folders side by side, or a method of one and a method of another (or the same) folder.
 
     Args:
         first: Folder of a finished sweep (A).
         second: Folder of another (B).
+        methods: The method of each that is taken; None for all, each with the one of the same name.
 
     Returns:
-        One row per test and method that both hold, over their common cases; and what differs between the two sweeps.
+        One row per test and method that both hold, over their common cases, with the means of the measures and of their
+        paired differences A - B; and what differs between the two sweeps.
 
     Raises:
-        UserError: One of the folders holds no finished sweep, or they share no case.
+        UserError: One of the folders holds no finished sweep, or not its method, or they share no case.
     """
     folders = [ResultFolder(path) for path in (first, second)]
     frames = [folder.results().to_pandas() for folder in folders]
+    if methods is not None:
+        frames = [_of_method(*one) for one in zip(frames, methods, (first, second), strict=True)]
+    group = GROUP if methods is None else GROUP[:-1]
     paired = [frame[frame["source"] != TRAFFIC] for frame in frames]
-    both = paired[0].merge(paired[1], on=[*GROUP, "case"], suffixes=("_a", "_b"))
+    both = paired[0].merge(paired[1], on=[*group, "case"], suffixes=("_a", "_b"))
     same_start = np.isclose(both["ambiguity_s_a"], both["ambiguity_s_b"])  # other seeds draw cases of the same names
     both = both[same_start]
     if both.empty:
@@ -45,21 +51,36 @@ def compare(first: Path, second: Path) -> tuple[Table, list[str]]:
             "traffic are never the same: see the intervals of each)"
         )
     rows = [
-        dict(zip(GROUP, key, strict=True)) | _row(part) for key, part in both.groupby(GROUP, sort=False, observed=True)
+        dict(zip(group, key, strict=True)) | _row(part) for key, part in both.groupby(group, sort=False, observed=True)
     ]
     data = pd.DataFrame(rows)
-    place = {method: i for i, method in enumerate(in_order(data["method"]))}
-    data = data.assign(place=data["method"].map(place)).sort_values([*GROUP[:4], "place"], ignore_index=True)
+    if methods is None:
+        place = {method: i for i, method in enumerate(in_order(data["method"]))}
+        data = data.assign(place=data["method"].map(place)).sort_values([*GROUP[:4], "place"], ignore_index=True)
     columns = [
-        *(Column(name, name) for name in GROUP if name in ("scenario", "method") or data[name].nunique() > 1),
+        *(Column(name, name) for name in group if name in ("scenario", "method") or data[name].nunique() > 1),
         Column("n", "n", 0, "common cases"),
         *(Column(f"failure_pct_{side}", f"{side.upper()} %", 2, "failures") for side in "ab"),
         *(Column(f"only_{side}", f"only {side.upper()}", 0, "failures") for side in "ab"),
         Column("p", "McNemar p", 3, "failures"),
-        *(Column(f"{name}_{side}", side.upper(), 2, title) for name, title in MEASURES.items() for side in "ab"),
+        *(
+            Column(f"{name}_{side}", heading, 2, title)
+            for name, title in MEASURES.items()
+            for side, heading in (("a", "A"), ("b", "B"), ("difference", "A − B"))
+        ),
     ]
-    title = f"A: {first}, B: {second}"
-    return Table.of(data, columns, list(map(is_reference, data["method"])), title), _differences(folders, frames)
+    if methods is None:
+        apart, title = list(map(is_reference, data["method"])), f"A: {first}, B: {second}"
+    else:
+        apart, title = [False] * len(data), f"A: {first}, {methods[0]}; B: {second}, {methods[1]}"
+    return Table.of(data, columns, apart, title), [] if first == second else _differences(folders, frames)
+
+
+def _of_method(rows: pd.DataFrame, method: str, folder: Path) -> pd.DataFrame:
+    known = rows["method"].unique().tolist()
+    if method not in known:
+        raise UserError(f"{folder}: no method '{method}' in these results{did_you_mean(method, known)}")
+    return rows[rows["method"] == method]
 
 
 def _row(part: pd.DataFrame) -> dict[str, Any]:
@@ -67,6 +88,7 @@ def _row(part: pd.DataFrame) -> dict[str, Any]:
     failed = [scored[f"failed_{side}"].to_numpy(dtype=bool) for side in "ab"]
     only_a, only_b = (int((one & ~other).sum()) for one, other in (failed, failed[::-1]))
     means = {f"{name}_{side}": part[f"{name}_{side}"].mean() for name in MEASURES for side in "ab"}
+    means |= {f"{name}_difference": (part[f"{name}_a"] - part[f"{name}_b"]).mean() for name in MEASURES}
     rates = {f"failure_pct_{side}": 100 * f.mean() if len(f) else np.nan for side, f in zip("ab", failed, strict=True)}
     p = mcnemar(only_a, only_b) if is_sample(part) else None
     return {"n": len(scored), **rates, "only_a": only_a, "only_b": only_b, "p": p, **means}

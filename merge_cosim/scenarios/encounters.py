@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 
 from merge_cosim.core.encounter import Encounters, Intention
 from merge_cosim.core.errors import UserError
@@ -20,7 +21,7 @@ from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.scenarios.hidden import hidden_encounters
 from merge_cosim.scenarios.scenario import Scenario
-from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Traffic
+from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Table, Traffic
 from merge_cosim.sumo.route_reader import read_sumocfg
 
 SourceChoice = Literal["ngsim", "surrogate"]
@@ -44,6 +45,8 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
     if isinstance(scenario.encounters, ByArrival):
         encounters = hidden_encounters(scenario.encounters)
         return replace(encounters, label=scenario.merging_car().intentions(encounters))
+    if isinstance(scenario.encounters, Table):
+        return _table(scenario.encounters, scenario.name)
     if isinstance(scenario.encounters, Routes):
         return read_sumocfg(scenario.encounters.file)[1]
     if isinstance(scenario.encounters, Traffic):
@@ -100,6 +103,19 @@ def _refuse_nothing(data: Path, wanted: Site) -> None:
         f"{data}: no row of {' or '.join(one.name for one in sites)} in any file there"
         f"{f' ({notes})' if notes else ''}; leave it out, or add --source surrogate, to use the surrogate"
     )
+
+
+def _table(table: Table, scenario: str) -> Encounters:
+    if table.file is None:
+        raise UserError(f"scenario {scenario}: the key 'encounters.file' is missing")
+    try:
+        frame = (pd.read_parquet if table.file.suffix == ".parquet" else pd.read_csv)(table.file)
+    except (OSError, ValueError) as error:  # pandas' and pyarrow's own are among them
+        raise UserError(f"{table.file}: not a readable CSV or Parquet file ({error})") from None
+    try:
+        return Encounters.from_frame(frame)
+    except UserError as error:
+        raise UserError(f"{table.file}: {error}") from None
 
 
 def _grid(grid: Grid) -> Encounters:

@@ -17,13 +17,14 @@ from pydantic import (
 )
 
 from merge_cosim.controllers.law import FreeDriving
+from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
 from merge_cosim.core.registry import did_you_mean, parameters
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ramps.ramp import ramp_names
-from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Span, Strict, Traffic
+from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Span, Strict, Table, Traffic
 from merge_cosim.scoring.scoring import Rules
 from merge_cosim.simulation.worlds.logged_rules import FullScene
 from merge_cosim.sumo.configuration import Configuration
@@ -53,7 +54,7 @@ class Scenario(Strict):
     title: str
     about: str = ""
     ramp: str
-    encounters: Annotated[Grid | Random | ByArrival | Pairs | Routes | Traffic, Field(discriminator="kind")]
+    encounters: Annotated[Grid | Random | ByArrival | Table | Pairs | Routes | Traffic, Field(discriminator="kind")]
     merging: dict[str, Any]
     full_scene: FullScene | None = None
     test: Rules = Rules()
@@ -110,12 +111,24 @@ def scenario_names() -> list[str]:
     return sorted(file.stem for file in shipped("scenarios").glob("*.toml"))
 
 
-def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) -> Scenario:
+def load_scenario(scenario: str | Path | Scenario, settings: Mapping[str, Any] | None = None) -> Scenario:
     """Read a shipped scenario by name, or any by file, with some values set otherwise (`test.horizon`, `ramp`, ...).
+
+    Example:
+        >>> load_scenario("designed-2", {"test.horizon": 20}).test.horizon
+        20.0
+
+    Args:
+        scenario: Name of a shipped one, scenario file, SUMO configuration, or a scenario that is to be changed.
+        settings: Values by key.
 
     Raises:
         UserError: There is no such scenario, or a key or value in it is wrong.
     """
+    if isinstance(scenario, Scenario):
+        document = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
+        return _validated(document, settings, f"scenario {scenario.name}")
+    name_or_file = str(scenario)
     file = shipped("scenarios") / f"{name_or_file}.toml"
     if not file.is_file():
         file = Path(name_or_file)
@@ -124,20 +137,40 @@ def load_scenario(name_or_file: str, settings: Mapping[str, Any] | None = None) 
             raise UserError(f"{file}: no such scenario file")
         raise UserError(f"unknown scenario '{name_or_file}'{did_you_mean(name_or_file, scenario_names())}")
     document = _of_sumocfg(file) if file.suffix in SUMO_SUFFIXES else _of_toml(file)
+    return _validated({"name": file.stem, **document}, settings, str(file))
+
+
+def scenario_of(encounters: Encounters, name: str) -> Scenario:
+    """A scenario for encounters that a Python program hands over.
+
+    The ramp is that of the designed tests, and the merging car drives as logged where there is a log, else by the
+    model `designed`; settings (`ramp`, `merging`) change that.
+    """
+    return Scenario(
+        name=name,
+        title=f"Initial states '{name}'",
+        ramp="designed",
+        encounters=Table(kind="table"),
+        merging={"model": "designed" if encounters.log is None else "replay"},
+    )
+
+
+def _validated(document: dict[str, Any], settings: Mapping[str, Any] | None, where: str) -> Scenario:
+    """A scenario from its keys, with some set otherwise; `where` begins the message about a wrong one."""
     for name, value in (settings or {}).items():
         _set(document, name, value)
     try:
         # as JSON in strict mode: a list is a tuple and a text is a path, but true is no number
-        scenario = Scenario.model_validate_json(json.dumps({"name": file.stem, **document}), strict=True)
+        scenario = Scenario.model_validate_json(json.dumps(document, default=_plain), strict=True)
     except ValidationError as error:
-        raise UserError(f"{file}: {_first_problem(error)}") from None
+        raise UserError(f"{where}: {_first_problem(error)}") from None
     except UserError as error:
-        raise UserError(f"{file}: {error}") from None
+        raise UserError(f"{where}: {error}") from None
     if not scenario.is_scene:
         try:
             scenario.merging_car()
         except UserError as error:
-            raise UserError(f"{file}: {error}") from None
+            raise UserError(f"{where}: {error}") from None
     return scenario
 
 
@@ -161,6 +194,11 @@ def _of_sumocfg(file: Path) -> dict[str, Any]:
     }
 
 
+def _plain(value: Any) -> Any:
+    """A value of a Python program as JSON has it: numpy's numbers and paths."""
+    return value.item() if hasattr(value, "item") else str(value)
+
+
 def _set(document: dict[str, Any], name: str, value: Any) -> None:
     *parents, last = name.split(".")
     for parent in parents:
@@ -174,6 +212,7 @@ _KNOWN: dict[tuple[str, ...], type] = {
     (): Scenario,
     ("encounters", "grid"): Grid,
     ("encounters", "random"): Random,
+    ("encounters", "table"): Table,
     ("encounters", "pairs"): Pairs,
     ("encounters", "drawn"): ByArrival,
     ("encounters", "routes"): Routes,
@@ -187,7 +226,7 @@ _KNOWN: dict[tuple[str, ...], type] = {
 }
 
 
-_KINDS = ("grid", "random", "drawn", "pairs", "routes", "traffic")
+_KINDS = ("grid", "random", "drawn", "table", "pairs", "routes", "traffic")
 
 
 def _first_problem(error: ValidationError) -> str:

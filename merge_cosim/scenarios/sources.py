@@ -118,6 +118,17 @@ class Random(Strict):
     length: PositiveFloat = 5.0
 
 
+class Table(Strict):
+    """Initial states of one's own: a row per case, with the columns of `Encounters.from_frame`.
+
+    Attributes:
+        file: CSV or Parquet file; None where a Python program hands the encounters over.
+    """
+
+    kind: Literal["table"]
+    file: Path | None = None
+
+
 class Pairs(Strict):
     """Logged pairs, or those of the surrogate.
 

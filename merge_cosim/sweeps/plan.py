@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -37,6 +37,8 @@ from merge_cosim.sweeps.scene_task import SceneBatch
 from merge_cosim.sweeps.task import Batch, Task
 
 StartMethod = Literal["spawn", "fork"]
+ScenarioSpec: TypeAlias = str | Scenario | tuple[Scenario, Encounters]
+"""Name or file of a scenario, a scenario, or one along with its encounters."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,9 @@ class SweepRequest:
     """What the user asked for.
 
     Attributes:
-        scenarios: Names or files.
+        scenarios: Names or files, or the scenarios themselves.
         methods: Names, components or pairs of them, see `Method.of`; empty for all that there are.
-        model: Model file or name; None for the one that goes with each scenario's source.
+        model: Model file or name, or the model itself; None for the one that goes with each scenario's source.
         settings: Values of scenario keys and of component parameters.
         variations: One name and its values each, varied one at a time.
         data: Folder with NGSIM files.
@@ -59,9 +61,9 @@ class SweepRequest:
         against: Method that the others are compared with on the same cases; None for pgm, if it is there.
     """
 
-    scenarios: Sequence[str]
+    scenarios: Sequence[ScenarioSpec]
     methods: Sequence[MethodSpec] = ()
-    model: str | None = None
+    model: str | IntentionModel | None = None
     settings: dict[str, Any] = field(default_factory=dict)
     variations: Sequence[tuple[str, Sequence[Any]]] = ()
     data: Path | None = None
@@ -101,13 +103,14 @@ def plan(request: SweepRequest) -> list[Task]:
             _refuse_unused(of_components, methods)
             if varied in of_components:
                 methods = [method for method in methods if varied in method.parameters()]
-            for scenario in _scenarios(request.scenarios, of_scenario, varied):
+            for scenario, given in _scenarios(request.scenarios, of_scenario, varied):
                 if scenario.is_scene:
                     tasks += _scene_batches(scenario, label, methods, request)
                     continue
-                key = scenario.encounters_key
+                key = scenario.encounters_key if given is None else scenario.name
                 if key not in loaded:
-                    loaded[key] = _by_name(load_encounters(scenario, request.data, request.source))
+                    found = load_encounters(scenario, request.data, request.source) if given is None else given
+                    loaded[key] = _by_name(found)
                 tasks += _encounter_batches(scenario, label, methods, loaded[key], request)
     if not tasks:
         raise UserError("nothing to run: no method fits the scenarios")
@@ -134,15 +137,22 @@ def method_names(request: SweepRequest, tasks: Sequence[Task]) -> list[str]:
     return sorted({task.method.name for task in tasks} | derived)
 
 
-def _scenarios(names: Sequence[str], settings: dict[str, Any], varied: str) -> list[Scenario]:
+def _scenarios(
+    specs: Sequence[ScenarioSpec], settings: dict[str, Any], varied: str
+) -> list[tuple[Scenario, Encounters | None]]:
     """Load the scenarios; one that does not know what is varied is left as it is, if another does."""
-    loaded, refused = {}, []
-    for name in dict.fromkeys(names):
+    loaded: dict[str, tuple[Scenario, Encounters | None]] = {}
+    refused = []
+    for number, spec in enumerate(specs):
+        if isinstance(spec, str) and spec in specs[:number]:  # asked for twice
+            continue
+        named, given = spec if isinstance(spec, tuple) else (spec, None)
         try:
-            scenario = load_scenario(name, settings)
+            scenario = load_scenario(named, settings)
             if scenario.name in loaded:
-                raise UserError(f"{name}: another scenario is called '{scenario.name}', too; rename the file")
-            loaded[scenario.name] = scenario
+                where = spec if isinstance(spec, str) else "scenarios"
+                raise UserError(f"{where}: another scenario is called '{scenario.name}', too; rename one")
+            loaded[scenario.name] = scenario, given
         except UserError as error:
             if varied not in settings:
                 raise
@@ -208,7 +218,8 @@ def _model(method: Method, source: str, request: SweepRequest) -> IntentionModel
     """The learned model that a method needs; it is found to fit."""
     if not method.needs_model:
         return None
-    model = IntentionModel.load(request.model or default_model(source))
+    chosen = request.model or default_model(source)
+    model = chosen if isinstance(chosen, IntentionModel) else IntentionModel.load(chosen)
     method.driver(model)
     return model
 

@@ -119,7 +119,7 @@ def bounds(study: Study) -> Table:
     request = study.request
     rows = [
         row
-        for scenario in request.scenarios
+        for scenario in map(str, request.scenarios)
         if load_scenario(scenario).is_replay
         for row in bounds_of(scenario, request.settings, request.data, request.source)[1]
     ]

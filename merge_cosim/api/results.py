@@ -1,0 +1,197 @@
+"""`merge_cosim.Results`: what came out of a sweep."""
+
+from __future__ import annotations
+
+import shutil
+import weakref
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from merge_cosim.api.plots import Plots
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import did_you_mean
+from merge_cosim.report.comparison import compare
+from merge_cosim.report.page import write_report
+from merge_cosim.results.store import MANIFEST, SUMMARY_JSON, ResultFolder
+
+SHOWN = (
+    *("scenario", "variation", "site", "source", "method", "n", "failures", "failure_pct", "ci_low_pct", "ci_high_pct"),
+    *("censored", "host_not_reached", "distance_m", "delay_s", "hardest_braking", "unnecessary_yields", "cycle_us"),
+)
+"""Columns of the summary that fit a terminal."""
+EXAMPLE = "write one such as \"failed and method == 'pgm'\""
+
+
+class Results:
+    """The results of a sweep, read from its folder when they are asked for.
+
+    Shown as a table: a row per scenario and method, with the main measures.
+
+    Attributes:
+        path: The result folder.
+    """
+
+    def __init__(self, path: str | Path, temporary: bool = False) -> None:
+        """Open a folder; see `load_results`.
+
+        Args:
+            path: The folder.
+            temporary: Remove it along with this object, or when Python ends.
+        """
+        self.path = Path(path)
+        self._store = ResultFolder(self.path)
+        self._temporary = temporary
+        if temporary:
+            weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
+
+    @property
+    def plot(self) -> Plots:
+        """Figures of the results, such as `plot.failure_map()`."""
+        return Plots(self)
+
+    @cached_property
+    def rows(self) -> pd.DataFrame:
+        """One row per scenario, variation, case and method; the columns are explained in docs/results.md."""
+        return self._store.results().to_pandas()
+
+    @cached_property
+    def traces(self) -> pd.DataFrame:
+        """Of one illustrative case per scenario, one row per cycle and method."""
+        return self._store.traces().to_pandas()
+
+    @cached_property
+    def manifest(self) -> dict[str, Any]:
+        """What was run, by which versions and models, and how long it took."""
+        manifest: dict[str, Any] = self._store.read_json(MANIFEST)
+        return manifest
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods that have rows."""
+        return sorted(self.rows["method"].unique())
+
+    def summary(self) -> pd.DataFrame:
+        """One row per scenario, variation, site, source and method; see docs/measures.md.
+
+        Example:
+            >>> results.summary().set_index("method")["failure_pct"]  # doctest: +SKIP
+        """
+        return pd.DataFrame(self._store.read_json(SUMMARY_JSON))
+
+    def traffic(self) -> pd.DataFrame:
+        """Where there was living traffic: one row per scenario, variation and method about the traffic as a whole."""
+        return pd.DataFrame(self._store.traffic())
+
+    def notes(self) -> list[str]:
+        """What was noted in living traffic, a line for each kind of event."""
+        return self._store.note_lines()
+
+    def cases(self, where: str | None = None) -> pd.DataFrame:
+        """The rows for which a condition holds.
+
+        Example:
+            >>> results.cases("failed and method == 'pgm'")  # doctest: +SKIP
+
+        Args:
+            where: A condition on the columns, as `pandas.DataFrame.query` takes it; all rows, if not given.
+
+        Returns:
+            Those rows, numbered anew.
+
+        Raises:
+            UserError: The condition cannot be read, or names a column that there is not.
+        """
+        if where is None:
+            return self.rows.copy()
+        try:
+            holds = self.rows.eval(where, engine="python", local_dict={}, global_dict={})
+        except pd.errors.UndefinedVariableError as error:
+            name = str(error).split("'")[1]
+            raise UserError(
+                f"where {where!r}: no column '{name}'{did_you_mean(name, self.rows.columns.tolist())}"
+            ) from None
+        except Exception as error:  # pandas raises whatever its parser and numpy raise
+            raise UserError(f"where {where!r}: {' '.join(str(error).split())}; {EXAMPLE}") from None
+        if not (isinstance(holds, pd.Series) and pd.api.types.is_bool_dtype(holds)):
+            raise UserError(f"where {where!r}: this is no condition; {EXAMPLE}")
+        return self.rows[holds].reset_index(drop=True)
+
+    def compare(self, first: str, second: str, other: Results | None = None) -> pd.DataFrame:
+        """Compare two methods on the cases that both were run on.
+
+        Example:
+            >>> results.compare("pgm", "acc")  # doctest: +SKIP
+
+        Args:
+            first: Method A.
+            second: Method B.
+            other: Results that B's rows are taken from; these, if not given.
+
+        Returns:
+            One row per scenario, variation, site and source: `n` common cases, the failures of each, the cases that
+            only one of them fails, McNemar's exact p value (none for a fixed grid, which is no sample), and the
+            means of the main measures of both with the mean of the paired differences A - B.
+
+        Raises:
+            UserError: One of them was not run, or they have no case in common.
+        """
+        return compare(self.path, (other or self).path, (first, second))[0].data
+
+    def report(self, file: str | Path | None = None, against: str | None = None) -> Path:
+        """Write the report: one HTML page that needs nothing else; its tables go to `tables/` of the result folder.
+
+        Example:
+            >>> results.report("out.html")  # doctest: +SKIP
+
+        Args:
+            file: The page; `report.html` in the result folder, if not given.
+            against: Method that the others are compared with; the sweep's own choice, if not given.
+
+        Returns:
+            The page.
+
+        Raises:
+            UserError: The folder holds no finished sweep, or not the method to compare with.
+        """
+        page = write_report(self.path, against)
+        if file is None:
+            return page
+        target = Path(file)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(page, target)
+        return target
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __repr__(self) -> str:
+        where = "" if self._temporary else f" in {self.path}"
+        return f"Results{where}: {len(self.rows):,} rows\n{self._shown().to_string(index=False)}"
+
+    def _repr_html_(self) -> str:
+        return self._shown().to_html(index=False, border=0)
+
+    def _shown(self) -> pd.DataFrame:
+        summary = self.summary()
+        shown = summary[[name for name in SHOWN if name in summary]].replace("", None).dropna(axis="columns", how="all")
+        return shown.round(2)
+
+
+def load_results(folder: str | Path) -> Results:
+    """Read a result folder.
+
+    Example:
+        >>> results = mc.load_results("out/first")  # doctest: +SKIP
+
+    Args:
+        folder: What `--out` or `out` named.
+
+    Raises:
+        UserError: There is no finished sweep, or another version of merge-cosim wrote it.
+    """
+    results = Results(folder)
+    len(results)  # damage shows now
+    return results

@@ -1,0 +1,129 @@
+"""`merge_cosim.run`: one case alone, with every cycle recorded."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import pandas as pd
+
+from merge_cosim.api.request import ScenarioLike, request_of
+from merge_cosim.core.errors import UserError
+from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.scenarios.encounters import SourceChoice
+from merge_cosim.sumo.attach import Address
+from merge_cosim.sumo.outputs import SumoOutputs
+from merge_cosim.sweeps.plan import MethodSpec
+from merge_cosim.sweeps.single import NO_OUTPUTS, run_single
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Quantity = Literal["station", "speed", "log_odds"]
+
+
+@dataclass(frozen=True, repr=False)
+class Run:
+    """One case under one method.
+
+    Attributes:
+        row: The result row, as in `results.parquet`; of a whole scene of living traffic, its facts.
+        trace: One row per cycle: time, station and speed of both cars, log-odds, command.
+    """
+
+    row: dict[str, Any]
+    trace: pd.DataFrame
+
+    def plot(self, quantity: Quantity = "station") -> Figure:
+        """Draw both cars over time.
+
+        Args:
+            quantity: `"station"` or `"speed"` of both cars, or the estimator's `"log_odds"`.
+
+        Raises:
+            UserError: There is nothing to draw, as the log-odds of a plain rule or a whole scene of living traffic.
+        """
+        from merge_cosim.api.plots import case_figure
+
+        if "method" not in self.row or "failed" not in self.row:
+            raise UserError("plot: this is a whole scene of living traffic; run one of its meetings")
+        method = str(self.row["method"])
+        return case_figure(self.trace.assign(method=method), {method: bool(self.row["failed"])}, quantity)
+
+    def __repr__(self) -> str:
+        return f"{self._shown.to_string()}\n({len(self.trace):,} cycles in .trace)"
+
+    def _repr_html_(self) -> str:
+        return self._shown.to_frame("value").to_html(border=0)
+
+    @cached_property
+    def _shown(self) -> pd.Series:
+        return pd.Series({name: value for name, value in self.row.items() if value not in (None, "")}, dtype=object)
+
+
+def run(
+    scenario: ScenarioLike,
+    case: str,
+    method: MethodSpec,
+    *,
+    model: str | Path | IntentionModel | None = None,
+    settings: Mapping[str, Any] | None = None,
+    data: str | Path | None = None,
+    source: SourceChoice | None = None,
+    seed: int = 0,
+    plugins: Sequence[str | Path] = (),
+    gui: bool = False,
+    delay: int = 100,
+    trace: str | Path | None = None,
+    outputs: SumoOutputs = NO_OUTPUTS,
+    attach: str | None = None,
+) -> Run:
+    """Run one case alone; its outcome is the same as in a sweep.
+
+    Example:
+        >>> run = mc.run("designed-2", case="d+1_h15_m14", method="pgm")  # doctest: +SKIP
+        >>> run.plot("speed")  # doctest: +SKIP
+
+    Args:
+        scenario: A scenario, as `merge_cosim.sweep` takes it.
+        case: Name of the case, as in the column `case` of the rows.
+        method: A method, as `merge_cosim.sweep` takes it.
+        model: As in `merge_cosim.sweep`.
+        settings: As in `merge_cosim.sweep`.
+        data: As in `merge_cosim.sweep`.
+        source: As in `merge_cosim.sweep`.
+        seed: As in `merge_cosim.sweep`.
+        plugins: As in `merge_cosim.sweep`.
+        gui: Show it in sumo-gui.
+        delay: With `gui`: milliseconds per step; 100 is real time.
+        trace: File to write the trace to (.csv or .parquet).
+        outputs: Files that SUMO is to write.
+        attach: `HOST:PORT` of a SUMO that runs with `--remote-port`, to drive in that one.
+
+    Returns:
+        The result row and the trace.
+
+    Raises:
+        UserError: There is no such scenario, case or method, or what is asked for does not fit.
+    """
+    request = request_of(
+        scenario, [method], model=model, settings=settings, data=data, source=source, seed=seed, plugins=plugins
+    )
+    if trace is not None and Path(trace).suffix not in (".csv", ".parquet"):
+        raise UserError(f"{trace}: a trace is written as .csv or .parquet")
+    address = Address.parse(attach) if attach else None
+    with tempfile.TemporaryDirectory(prefix="merge-cosim-") as folder:
+        file = Path(folder) / "trace.parquet"
+        row = run_single(request, case, delay if gui else None, file, outputs, address)
+        record = pd.read_parquet(file)
+    if trace is not None:
+        Path(trace).parent.mkdir(parents=True, exist_ok=True)
+        if Path(trace).suffix == ".csv":
+            record.to_csv(trace, index=False)
+        else:
+            record.to_parquet(trace, index=False)
+    return Run(row, record)

@@ -1,0 +1,90 @@
+"""`Results`: rows, summary, conditions, comparisons, figures and the report of a sweep."""
+
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+import merge_cosim as mc
+
+
+def test_rows_and_what_was_run(results):
+    assert len(results) == len(results.rows) == 2 * 3 * 4 * 4
+    assert results.methods == ["acc", "pgm"]
+    assert results.manifest["methods"] == ["acc", "pgm"]
+    assert set(results.traces["method"]) == {"acc", "pgm"}
+
+
+def test_it_shows_itself_as_a_table(results):
+    shown = results.summary().set_index("method")["failures"]
+    assert repr(results).startswith("Results: 96 rows\n")
+    assert results._repr_html_().count("<tr") == 1 + len(shown)
+    for method, line in zip(shown.index, repr(results).splitlines()[2:], strict=True):
+        assert f" {method} " in line
+
+
+def test_the_cases_for_which_a_condition_holds(results):
+    rows = results.rows
+    failed = results.cases("failed and method == 'pgm'")
+    assert failed["case"].tolist() == rows["case"][rows["failed"] & (rows["method"] == "pgm")].tolist()
+    assert len(failed)
+    assert len(results.cases()) == len(rows)
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        ("fialed", "no column 'fialed'; did you mean 'failed'"),
+        ("failed and", "write one such as"),
+        ("method", "this is no condition"),
+        ("@failed", "no column 'failed'"),
+    ],
+)
+def test_a_condition_that_cannot_be_read_is_refused(results, where, message):
+    with pytest.raises(mc.UserError, match=message):
+        results.cases(where)
+
+
+def test_two_methods_on_the_same_cases(results):
+    rows = results.rows.pivot(index="case", columns="method")
+    compared = results.compare("pgm", "acc").iloc[0]
+    assert compared["n"] == len(rows)
+    assert compared["only_a"] == (rows["failed", "pgm"] & ~rows["failed", "acc"]).sum()
+    assert compared["only_b"] == (rows["failed", "acc"] & ~rows["failed", "pgm"]).sum()
+    delays = (rows["delay_s", "pgm"] - rows["delay_s", "acc"]).mean()
+    assert compared["delay_s_difference"] == pytest.approx(delays)
+    assert results.compare("acc", "acc", other=results).iloc[0]["delay_s_difference"] == 0
+    with pytest.raises(mc.UserError, match="no method 'pmg' in these results; did you mean 'pgm'"):
+        results.compare("pmg", "acc")
+
+
+def test_a_sample_gets_a_p_value():
+    states = pd.DataFrame({"host_station": [-90.0, -85.0], "host_speed": 20.0, "merging_station": -90.0})
+    sample = mc.Encounters.from_frame(states.assign(merging_speed=[20.0, 18.0]), sample=True)
+    compared = mc.sweep([sample], ["always-go", "always-yield"], jobs=1).compare("always-go", "always-yield")
+    assert 0 < compared["p"].iloc[0] <= 1
+
+
+def test_figures(results):
+    axes = results.plot.failure_map(methods=["pgm"]).axes
+    assert [ax.get_title() for ax in axes if ax.get_title()] == ["pgm"]
+    assert isinstance(results.plot.delay("designed-2"), Figure)
+    assert len(results.plot.case("speed").axes) == 1
+    for wrong in ({"scenario": "designed-3"}, {"methods": ["pmg"]}):
+        with pytest.raises(mc.UserError, match="in these results"):
+            results.plot.failure_map(**wrong)
+    with pytest.raises(mc.UserError, match=r"'acc\.headway' was not varied"):
+        results.plot.variation("acc.headway")
+
+
+def test_a_report_goes_where_it_is_asked_for(results, tmp_path):
+    page = results.report(tmp_path / "new" / "out.html", against="acc")
+    assert page == tmp_path / "new" / "out.html"
+    assert "designed-2" in page.read_text(encoding="utf-8")
+
+
+def test_a_folder_is_read_again(results, tmp_path):
+    again = mc.load_results(results.path)
+    assert again.rows.equals(results.rows)
+    assert str(results.path) in repr(again)
+    with pytest.raises(mc.UserError, match="no results here"):
+        mc.load_results(tmp_path)
