@@ -24,21 +24,18 @@ class Plots:
         self._results = results
 
     def failure_map(self, scenario: str | None = None, methods: list[str] | None = None) -> Figure:
-        """Share of failed cases of a grid by both initial speeds, one small map per method.
+        """Share of failed cases by both initial speeds, one small map per method.
 
         Args:
-            scenario: A grid scenario; not needed where the sweep has one only.
+            scenario: A scenario; not needed where the sweep has one only.
             methods: Methods to draw; all, if not given.
 
         Raises:
-            UserError: There is no such scenario or method, or the scenario is no grid.
+            UserError: There is no such scenario or method.
         """
-        from merge_cosim.report.set_figures import GRID_CASE, failure_map
+        from merge_cosim.report.set_figures import failure_map
 
-        rows = self._rows(scenario, methods)
-        if not rows["case"].str.match(GRID_CASE).all():
-            raise UserError(f"failure_map: scenario {rows['scenario'].iloc[0]} is no grid; use plot.delay()")
-        return failure_map(rows)
+        return failure_map(self._rows(scenario, methods))
 
     def delay(self, scenario: str | None = None, methods: list[str] | None = None) -> Figure:
         """Delay of each case against how ambiguous its start was, one panel per method; failures as red crosses.
