@@ -9,11 +9,13 @@ from typing import Any, TypeAlias
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import Component
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ngsim.data import find_data
 from merge_cosim.scenarios.encounters import SourceChoice
+from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.scenarios.scenario import Scenario, scenario_of
-from merge_cosim.sweeps.plan import MethodSpec, ScenarioSpec, StartMethod, SweepRequest
+from merge_cosim.sweeps.plan import ScenarioSpec, StartMethod, SweepRequest
 
 ScenarioLike: TypeAlias = str | Path | Scenario | Encounters
 """A shipped scenario's name, a scenario file or SUMO configuration, a scenario, or initial states."""
@@ -89,4 +91,4 @@ def _checked(given: object) -> str | Scenario:
 def _methods(given: Methods) -> list[MethodSpec]:
     if given is None:
         return []
-    return [given] if isinstance(given, str) else list(given)
+    return [given] if isinstance(given, str | Component | type) else list(given)

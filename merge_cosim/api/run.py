@@ -15,9 +15,9 @@ from merge_cosim.api.request import ScenarioLike, request_of
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.scenarios.encounters import SourceChoice
+from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.sumo.attach import Address
 from merge_cosim.sumo.outputs import SumoOutputs
-from merge_cosim.sweeps.plan import MethodSpec
 from merge_cosim.sweeps.single import NO_OUTPUTS, run_single
 
 if TYPE_CHECKING:
