@@ -192,7 +192,7 @@ class Session:
         self._api.vehicle.setRoute(car, route[route.index(self.edge(car)) :])
 
     def leader(self, car: str, reach: float) -> Neighbour:
-        """The vehicle ahead in a vehicle's lane and on its route, at most `reach` away."""
+        """The vehicle ahead in a vehicle's lane, or at most `reach` away on the further lanes of its route."""
         name, gap = self._api.vehicle.getLeader(car, reach) or ("", 0.0)
         return Neighbour(name, gap + self.min_gap(car) if name else math.inf)
 
