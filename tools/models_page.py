@@ -51,7 +51,7 @@ TAIL = """\
   So do {both}. The two counts differ only through the cars that stand in one class, and through windows of different
   length. The reason is how the pairs are made, not the number of cars.
 - **{frames} frames of real data are not as many independent observations**: those of one car are nearly alike. With
-  {cars} cars, differences of a few per cent between estimators are not significant.
+  {cars} cars, differences of a few per cent between estimators remain undecided.
 - Both cars drive as logged. A host that acts on the estimates gets into other situations than these.
 """
 REAL = {"ngsim": "real data", "surrogate": "surrogate"}
