@@ -19,6 +19,15 @@ def data_dir() -> Path:
     return Path(folder)
 
 
+@pytest.fixture(scope="session")
+def mona_dir() -> Path:
+    """The folder with the merge of the MONA data set; tests that need it are skipped where it is absent."""
+    folder = os.environ.get("MERGE_COSIM_MONA")
+    if not folder or not Path(folder).is_dir():
+        pytest.skip("MONA data not at hand: set MERGE_COSIM_MONA")
+    return Path(folder)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Keep the user's cache out of the tests; all processes of a run share one, and one that is set already is kept."""

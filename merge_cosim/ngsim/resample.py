@@ -1,6 +1,7 @@
 """Recordings of another frame rate than 10 Hz, resampled; and those whose tracks begin badly, cut."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
@@ -38,7 +39,7 @@ def at_10_hz(table: pa.Table, rate: float) -> pa.Table:
     old = {name: table[name].to_numpy().astype(np.float64) for name in (*LINEAR, "y")}
     frames, before = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     new: dict[str, list[np.ndarray]] = {name: [np.empty(0)] for name in old}
-    for start, end in zip(starts, np.append(starts[1:], table.num_rows), strict=True):
+    for start, end in pairwise([*starts.tolist(), table.num_rows]):
         here = time[start:end]
         frame = np.arange(math.ceil(here[0] / DT - TOLERANCE), math.floor(here[-1] / DT + TOLERANCE) + 1)
         at = np.clip(frame * DT, here[0], here[-1])

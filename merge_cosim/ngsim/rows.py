@@ -111,7 +111,8 @@ def _sites(raw: pa.Table, place: Place, assumed: Site | None) -> tuple[list[str]
 def _rows(raw: pa.Table, site: str, place: Place) -> pa.Table:
     """Return one site's rows in the canonical columns, checked."""
     source, layout = place.source, place.source.layout
-    values = {"part": np.ones(raw.num_rows)} | {name: np.full(raw.num_rows, np.nan) for name in ("x", *OPTIONAL)}
+    values = {"part": np.ones(raw.num_rows), "x": np.zeros(raw.num_rows)}
+    values |= {name: np.full(raw.num_rows, np.nan) for name in OPTIONAL}
     for name, spelled in layout.numbers.items():
         if column := source.find(spelled):
             values[name] = checked(raw[column], column, name, place)

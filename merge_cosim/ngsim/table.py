@@ -31,8 +31,9 @@ SCHEMA = pa.schema(
 
 - `site`; `recording`: the stretch of time whose frames stand on one clock; `vehicle_id`: unique within a recording;
 - `part`: gap-free piece of a car's track, counted from 1; `frame`: frame number within the recording;
-- `x`, `y` [m]: NGSIM's Local_X and Local_Y, front bumper across and along the road; `speed` [m/s];
-- `length`, `width` [m], NaN where not logged; `lane`: NGSIM's lane number;
+- `x`, `y` [m]: front bumper across the road (0 where not logged) and along it, in NGSIM Local_X and Local_Y;
+- `speed` [m/s];
+- `length`, `width` [m], NaN where not logged; `lane`: the recording's lane number;
 - `smoothed`: the source's positions were smoothed before they were published.
 """
 

@@ -12,7 +12,7 @@ from merge_cosim.core.encounter import NEVER, Encounters, Intention, Ragged, Rep
 from merge_cosim.core.units import DT, TOLERANCE, AnyArray, FloatArray, IntArray
 from merge_cosim.ngsim.pairing.rules import PairRules, cycles
 from merge_cosim.ngsim.pairing.smoothing import filter_causally
-from merge_cosim.ngsim.pairing.tracks import Tracks, build_tracks
+from merge_cosim.ngsim.pairing.tracks import Tracks, build_tracks, carried_on
 from merge_cosim.ngsim.sites import Site
 
 
@@ -52,7 +52,7 @@ def extract_pairs(table: pa.Table, site: Site, rules: PairRules, source: str) ->
         rules: The thresholds.
         source: What the encounters name as their source.
     """
-    return pair_tracks(build_tracks(table, site, rules), site, rules, source)
+    return pair_tracks(carried_on(build_tracks(table, site, rules), cycles(rules.carry_on)), site, rules, source)
 
 
 def pair_tracks(tracks: Tracks, site: Site, rules: PairRules, source: str) -> Paired:
@@ -188,8 +188,11 @@ def _encounters(
 
 
 def _credible_end(tracks: Tracks, track: IntArray, change: IntArray, rules: PairRules) -> IntArray:
-    """Row after the last credible one of each track: its end, or where it breaks the limits after row `change`."""
-    ends = tracks.offsets[track + 1]
+    """Row after the last credible one of each track: where it breaks the limits after row `change`, or its end.
+
+    A track that ended before `change` was carried on as far as that row.
+    """
+    ends = np.maximum(tracks.offsets[track + 1] - tracks.carried, change + 1)
     for index, (first, end) in enumerate(zip(change - 1, ends, strict=True)):
         speed = np.diff(tracks.y[first:end]) / DT
         jumps = (speed[1:] > rules.max_speed) | (np.abs(np.diff(speed) / DT) > rules.max_acceleration)

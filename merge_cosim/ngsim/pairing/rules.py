@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, NonNegativeFloat, model_validator
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT
@@ -26,6 +26,8 @@ class PairRules(BaseModel):
         max_window: The window starts at most this long before the lane change [s]; None for as early as both are
             logged. For sensitivity: a later start takes the easy, far part of the approach away.
         hold: A car is in (or out of) the host lane once it stays there this long; shorter is flicker [s].
+        carry_on: Where the recorded road ends soon: a host that left it counts on at its last speed for at most this
+            long, so that it may still be there at the lane change [s]. 0: it must be logged.
         max_speed: A pair is rejected if either smoothed track is faster than this within the window [m/s].
         max_acceleration: A pair is rejected if either smoothed track accelerates or brakes harder [m/s^2].
         default_length: Length of a car whose length was not logged [m].
@@ -42,6 +44,7 @@ class PairRules(BaseModel):
     min_window: float = 2.0
     max_window: float | None = None
     hold: float = 0.5
+    carry_on: NonNegativeFloat = 0.0
     max_speed: float = 40.0
     max_acceleration: float = 10.0
     default_length: float = 5.0

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
 
-from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, IntArray
+from merge_cosim.core.units import DT, AnyArray, BoolArray, FloatArray, IntArray
 from merge_cosim.ngsim.pairing.rules import PairRules, cycles
 from merge_cosim.ngsim.pairing.smoothing import smooth_tracks
 from merge_cosim.ngsim.sites import Site
@@ -29,6 +29,7 @@ class Tracks:
         lane: The recording's lane number, flicker removed, shape (rows,). The lanes beside the main road (on-ramp,
             auxiliary lane, off-ramp) are one path and all have the number of the site's first on-ramp lane.
         smoothed: Smoothed by the source before it was published, shape (rows,).
+        carried: So many rows at the end of every track were not logged: the car goes on at its last speed, in its lane.
     """
 
     recording: AnyArray
@@ -43,13 +44,14 @@ class Tracks:
     in_host: BoolArray
     lane: IntArray
     smoothed: BoolArray
+    carried: int = 0
 
     def __len__(self) -> int:
         return len(self.vehicle)
 
     @property
     def last_frame(self) -> IntArray:
-        """Last frame of each track, shape (n,)."""
+        """Last frame of each track, those carried on included, shape (n,)."""
         return self.first_frame + np.diff(self.offsets) - 1
 
     def row(self, track: IntArray, frame: IntArray) -> IntArray:
@@ -113,6 +115,26 @@ def build_tracks(table: pa.Table, site: Site, rules: PairRules, *, everywhere: b
         in_host=without_flicker(lane == site.host_lane, offsets, cycles(rules.hold)),
         lane=steady_lanes(path, offsets, cycles(rules.hold)),
         smoothed=table["smoothed"].to_numpy()[rows],
+    )
+
+
+def carried_on(tracks: Tracks, more: int) -> Tracks:
+    """Carry every track on by `more` rows: its last step is repeated, all else stays as in its last row."""
+    if not more:
+        return tracks
+    ends, steps = tracks.offsets[1:], np.diff(tracks.offsets)
+    last = ends - 1
+    step = np.where(steps > 1, tracks.y[last] - tracks.y[last - 1], tracks.speed[last] * DT)
+    rows = np.insert(np.arange(len(tracks.y)), np.repeat(ends, more), np.repeat(last, more))
+    beyond = np.insert(np.zeros(len(tracks.y)), np.repeat(ends, more), np.tile(np.arange(1, more + 1), len(tracks)))
+    track = np.repeat(np.arange(len(tracks)), steps + more)
+    held = {name: getattr(tracks, name)[rows] for name in ("speed", "on_ramp", "in_host", "lane", "smoothed")}
+    return replace(
+        tracks,
+        **held,
+        offsets=tracks.offsets + more * np.arange(len(tracks) + 1),
+        y=tracks.y[rows] + beyond * step[track],
+        carried=more,
     )
 
 

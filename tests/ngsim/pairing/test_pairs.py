@@ -5,6 +5,7 @@ from trajectory_tables import Car, steady, table
 
 from merge_cosim.core.encounter import NEVER, Intention
 from merge_cosim.core.units import DT
+from merge_cosim.ngsim.pairing.checks import replay_logged_host
 from merge_cosim.ngsim.pairing.pairs import Paired, extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.sites import site
@@ -182,3 +183,15 @@ def test_no_car_at_all() -> None:
     for cars in (empty, table(steady(1, [3] * 5, at=0))):
         paired = extract_pairs(cars, US101, PairRules(), "ngsim")
         assert (len(paired.encounters), paired.merging_cars) == (0, 0)
+
+
+def test_a_host_that_left_the_recorded_road_is_carried_on_to_the_lane_change() -> None:
+    """Its log ends with the cycle of the lane change, so that what follows counts as extended."""
+    cars = (steady(1, [6] * 40 + [5] * 10, at=0), steady(2, [5] * 30, at=20))
+    assert pairs(*cars).rejected == {"no_host": ("us101/r/1/1",)}
+    assert len(pairs(*cars, carry_on=0.9).encounters) == 0
+    e = pairs(*cars, carry_on=1.1).encounters
+    assert e.log is not None
+    assert (e.log.change_cycle.tolist(), e.log.host_station.lengths.tolist()) == ([40], [41])
+    np.testing.assert_allclose(e.log.host_station[0], 20 - 60 + 1.5 * np.arange(41), atol=1e-9)
+    assert replay_logged_host(e).extended.tolist() == [True]

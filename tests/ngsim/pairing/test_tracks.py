@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from trajectory_tables import GORE, steady, table
 
 from merge_cosim.ngsim.pairing.rules import PairRules
-from merge_cosim.ngsim.pairing.tracks import build_tracks, steady_lanes, without_flicker
-from merge_cosim.ngsim.sites import site
+from merge_cosim.ngsim.pairing.tracks import build_tracks, carried_on, steady_lanes, without_flicker
+from merge_cosim.ngsim.sites import Lanes, site
 
 US101 = site("us101")
 
@@ -104,3 +104,23 @@ def test_a_car_comes_into_the_host_lane_alike_by_both_rules(lanes: list[int], le
     among_all = steady_lanes(lane, offsets, 5) == 5
     alone = without_flicker(lane == 5, offsets, 5)
     assert np.argmax(among_all) == np.argmax(alone)
+
+
+def test_a_shared_lane_is_the_lane_before_it() -> None:
+    """Of the lanes 5 and 15 both are the host lane; 9 says nothing, at a track's start it counts as the host lane."""
+    lanes = Lanes(host=(5, 15), ramp=(6,), shared=(9,))
+    cars = table(steady(1, [6] * 3 + [9] * 6 + [15] * 6, at=0), steady(2, [9] * 3 + [5] * 6 + [9] * 6, at=40))
+    tracks = build_tracks(cars, US101.model_copy(update={"lanes": lanes}), PairRules())
+    assert tracks.lane.tolist() == [6] * 9 + [5] * 6 + [5] * 15
+    assert tracks.on_ramp.tolist() == [True] * 9 + [False] * 21
+    assert [array.tolist() for array in tracks.merges()] == [[0], [9]]
+
+
+def test_tracks_are_carried_on_at_their_last_speed() -> None:
+    tracks = build_tracks(table(steady(1, [6] * 10, at=0), steady(2, [5] * 12, at=40, frame=3)), US101, PairRules())
+    more = carried_on(tracks, 4)
+    assert (more.offsets.tolist(), more.last_frame.tolist(), more.carried) == ([0, 14, 30], [13, 18], 4)
+    expected = table(steady(1, [6] * 14, at=0), steady(2, [5] * 16, at=40, frame=3))
+    np.testing.assert_allclose(more.y, expected["y"].to_numpy(), atol=1e-9)
+    assert more.lane.tolist() == [6] * 14 + [5] * 16
+    assert carried_on(tracks, 0) is tracks
