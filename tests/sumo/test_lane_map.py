@@ -1,12 +1,13 @@
 """What SUMO's lanes mean on a ramp."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.ramp import Ramp, ramp_names
-from merge_cosim.sumo.lane_map import LaneMap, LanePosition, Part, RampLane
+from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, LanePosition, Part, RampLane
 
 
 @pytest.mark.parametrize(
@@ -84,3 +85,17 @@ def test_off_the_net_names_the_reach() -> None:
         lanes.place("ramp", 0.0, -1.0)
     with pytest.raises(ValueError, match="on neither path"):
         lanes.station(LanePosition("exit", 0, 3.0), 42.0)
+
+
+def test_x_runs_on_where_cars_cross_to_the_next_edge() -> None:
+    ramp = Ramp.load("us101")
+    lanes, along = LaneMap(ramp), AlongPaths(ramp, 2)
+    start = (("main", -10.0), ("main", 200.0), ("ramp", -1.0), ("ramp", 10.0))  # two hosts, then two merging cars
+    places = [lanes.place(path, x - 42.0, 42.0) for path, x in start]
+    for row, place in enumerate(places):
+        along.put(row, place)
+    positions = np.array([place.position for place in places])
+    assert along.x(positions).tolist() == [x for _, x in start]
+    assert along.x(np.array([2.0, 1.0, 3.0, 15.0])).tolist() == [2.0, 214.0, 3.0, 15.0]
+    along.put(0, lanes.place("main", -142.0, 42.0))  # back to a new start
+    assert along.x(np.array([401.0, 2.0, 4.0, 16.0])).tolist() == [-99.0, 215.0, 4.0, 16.0]
