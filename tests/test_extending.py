@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from command import COMMAND, merge_cosim
 
 PAGE = Path(__file__).parent.parent / "docs" / "extending.md"
 COARSE = "encounters.host_speed.step=8", "encounters.merging_speed.step=8", "encounters.host_offset.step=5"
@@ -22,32 +23,38 @@ def files(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run(folder: Path, *words: str, **more: str) -> str:
-    environment = os.environ | more
-    done = subprocess.run(
-        [sys.executable, *words], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
+def printed(done: subprocess.CompletedProcess[str]) -> str:
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
-def sweep(folder: Path, *words: str, **more: str) -> set[str]:
+def in_a_process(folder: Path, *words: str, **more: str) -> str:
+    return printed(
+        subprocess.run(words, cwd=folder, env=os.environ | more, capture_output=True, text=True, check=False)
+    )
+
+
+def sweep_words(*words: str) -> tuple[str, ...]:
     coarse = [word for value in COARSE for word in ("--set", value)]
-    command = ("-m", "merge_cosim.cli.main", "sweep", "designed-2", *coarse, *words, "--out", "out", "--json")
-    run(folder, *command, **more)
+    return ("sweep", "designed-2", *coarse, *words, "--out", "out", "--json")
+
+
+def methods(folder: Path) -> set[str]:
     return set(pq.read_table(folder / "out/results.parquet")["method"].to_pylist())
 
 
 def test_an_estimator_from_a_file(files):
-    assert "cautious" in run(files, "-m", "merge_cosim.cli.main", "methods", "--plugin", "my.py", "--json")
+    assert "cautious" in printed(merge_cosim("methods", "--plugin", "my.py", "--json", cwd=files))
     words = ("--plugin", "my.py", "--method", "cautious", "--method", "acc", "--set", "cautious.lead=5")
-    assert sweep(files, *words, "--jobs", "2") == {"cautious", "acc"}
-    assert Path(run(files, "-m", "merge_cosim.cli.main", "report", "out").strip()).name == "report.html"
+    printed(merge_cosim(*sweep_words(*words, "--jobs", "2"), cwd=files))
+    assert methods(files) == {"cautious", "acc"}
+    assert Path(printed(merge_cosim("report", "out", cwd=files)).strip()).name == "report.html"
     assert "cautious" in (files / "out/report.html").read_text(encoding="utf-8")
 
 
 def test_a_controller_from_a_file(files):
-    assert sweep(files, "--plugin", "my_controller.py", "--method", "acc+gentle", "--jobs", "1") == {"acc+gentle"}
+    printed(merge_cosim(*sweep_words("--plugin", "my_controller.py", "--method", "acc+gentle"), cwd=files))
+    assert methods(files) == {"acc+gentle"}
 
 
 def test_an_installed_entry_point(files):
@@ -57,11 +64,11 @@ def test_an_installed_entry_point(files):
     (facts / "entry_points.txt").write_text("[merge_cosim.estimator]\ncautious = my\n", encoding="utf-8")
     (files / "my.py").rename(files / "site" / "my.py")
     path = os.pathsep.join(filter(None, [str(files / "site"), os.environ.get("PYTHONPATH", "")]))
-    assert sweep(files, "--method", "cautious", "--jobs", "2", PYTHONPATH=path) == {"cautious"}
+    in_a_process(files, *COMMAND, *sweep_words("--method", "cautious", "--jobs", "2"), PYTHONPATH=path)
+    assert methods(files) == {"cautious"}
 
 
 @pytest.mark.slow
 def test_a_study_from_python(files):
-    printed = run(files, "study.py")
-    assert "cautious" in printed
+    assert "cautious" in in_a_process(files, sys.executable, "study.py")
     assert (files / "out/study/report.html").is_file()

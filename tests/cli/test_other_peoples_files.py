@@ -4,9 +4,9 @@ import csv
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -37,9 +37,13 @@ def table(file: Path) -> list[dict[str, str]]:
 def test_the_commands_of_the_page(tmp_path: Path) -> None:
     (block,) = re.findall(r"```sh\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     script = block.replace("--out", "--set encounters.end=100 --out")
-    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
-    environment = os.environ | {"SUMO_HOME": sumo.SUMO_HOME, "PATH": path}
-    subprocess.run(["bash", "-euc", script], cwd=tmp_path, env=environment, check=True)
+    copy, *commands = script.splitlines()
+    environment = os.environ | {"SUMO_HOME": sumo.SUMO_HOME}
+    subprocess.run(["bash", "-euc", copy], cwd=tmp_path, env=environment, check=True)
+    for name, *words in map(shlex.split, commands):
+        assert name == "merge-cosim"
+        done = merge_cosim(*words, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
     found = pq.read_table(tmp_path / "out" / "ramp" / "results.parquet").to_pandas()
     assert set(found["method"]) == {"acc", "pgm"}
     assert found["case"].str.match(r"000/highway1\.\d+/onramp\.\d+").all()

@@ -9,12 +9,16 @@ import sys
 import time
 from pathlib import Path
 
+import libsumo
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from command import merge_cosim
+from command import COMMAND, merge_cosim
 from running import Running
 from scene_files import ROUTES, own_files, small_scene
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.sweeps.listener import HostListener
 
 
 def rows(folder):
@@ -85,7 +89,7 @@ def test_the_same_bytes_for_any_number_of_processes(minute):
 
 def test_a_killed_sweep_goes_on_to_the_same_rows(minute):
     folder, out, _ = minute
-    command = [sys.executable, "-m", "merge_cosim.cli.main", "sweep", "minute.toml", "--method", "acc"]
+    command = [*COMMAND, "sweep", "minute.toml", "--method", "acc"]
     command += ["--method", "always-yield", "--jobs", "1", "--out", "killed"]
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     while process.poll() is None and not list((folder / "killed").glob("parts/*.parquet")):
@@ -202,12 +206,19 @@ def test_hosts_that_never_depart_are_told(tmp_path):
     assert "nothing to report: no car merged next to a host" in report.stderr
 
 
-@pytest.mark.parametrize("module", ["traci", "libsumo"])
-def test_the_script_of_the_page_finds_the_same_meetings(minute, module):
+@pytest.fixture(scope="module")
+def short(minute):
+    """Files of a shorter scene, and its meetings under PGM."""
     folder, _, _ = minute
-    short = ("--set", "encounters.demand.duration=35")
-    merge_cosim("export", "minute.toml", "--case", "000", *short, "--out", "short", cwd=folder)
-    own, _ = swept(folder, "short/traffic.sumocfg", "--method", "pgm", out=f"own-{module}")
+    demand = ("--set", "encounters.demand.duration=35")
+    merge_cosim("export", "minute.toml", "--case", "000", *demand, "--out", "short", cwd=folder)
+    own, _ = swept(folder, "short/traffic.sumocfg", "--method", "pgm", out="own-short")
+    return folder, rows(own).to_pandas()
+
+
+@pytest.mark.parametrize("module", ["traci", "libsumo"])
+def test_the_script_of_the_page_finds_the_same_meetings(short, module):
+    folder, theirs = short
     page = Path(__file__).parents[2] / "docs" / "traffic.md"
     (script,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     assert len([line for line in script.splitlines() if line and not line.startswith("#")]) <= 11
@@ -219,34 +230,33 @@ def test_the_script_of_the_page_finds_the_same_meetings(minute, module):
     done = subprocess.run(command, cwd=folder, env=activated, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     mine = pd.read_parquet(folder / "mine.parquet").sort_values("case", ignore_index=True)
-    theirs = rows(own).to_pandas()
     named = ["scenario", "site"]
     pd.testing.assert_frame_equal(mine.drop(columns=named), theirs.drop(columns=named))
     assert mine["case"][0] in done.stdout
 
 
-def test_a_listener_refuses_other_conditions(minute):
+@pytest.mark.parametrize(
+    ("step", "several", "ramp", "expected"),
+    [
+        ("0.2", 0.0, "us101", "start SUMO with --step-length 0.1"),
+        ("0.1", 0.0, "designed", "HostListener: SUMO has another net: no lane main_out_0 of"),
+        ("0.1", 1.0, "us101", r"several steps at once; call simulationStep\(\) without a time"),
+    ],
+)
+def test_a_listener_refuses_other_conditions(minute, step, several, ramp, expected):
     folder, _, _ = minute
-    script = """
-import libsumo, sys
-from merge_cosim.core.errors import UserError
-from merge_cosim.sweeps.listener import HostListener
-step, several, ramp = sys.argv[1:]
-libsumo.start(["sumo", "-c", "files/traffic.sumocfg", "--no-step-log", "true", "--step-length", step])
-try:
-    libsumo.addStepListener(HostListener(libsumo, ramp, "acc"))
-    libsumo.simulationStep(float(several))
-except UserError as error:
-    print(error)
-"""
-    for arguments, expected in (
-        (("0.2", "0", "us101"), "start SUMO with --step-length 0.1"),
-        (("0.1", "0", "designed"), "HostListener: SUMO has another net: no lane main_out_0 of"),
-        (("0.1", "1", "us101"), "several steps at once; call simulationStep() without a time"),
-    ):
-        command = [sys.executable, "-c", script, *arguments]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
-        assert expected in done.stdout
+    scene = str(folder / "files/traffic.sumocfg")
+
+    def drive():
+        libsumo.addStepListener(HostListener(libsumo, ramp, "acc"))
+        libsumo.simulationStep(several)
+
+    libsumo.start(["sumo", "-c", scene, "--no-step-log", "true", "--step-length", step])
+    try:
+        with pytest.raises(UserError, match=expected):
+            drive()
+    finally:
+        libsumo.close()
 
 
 def test_in_a_sumo_that_runs_already(minute):

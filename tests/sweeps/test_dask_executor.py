@@ -72,7 +72,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path):
     ramp = merge_cosim("ramp", "new", "mine", "--out", "ramps", cwd=tmp_path)
     assert ramp.returncode == 0, ramp.stderr
     arguments = (
-        *("sweep", "designed-random", "--set", "encounters.count=4000", "--set", "ramp=ramps/mine"),
+        *("sweep", "designed-random", "--set", "encounters.count=2000", "--set", "ramp=ramps/mine"),
         *("--method", "pgm", "--method", "shipped", "--plugin", "shipped.py"),
     )
     alone = merge_cosim(*arguments, "--out", "alone", "--jobs", 1, cwd=tmp_path)
@@ -85,7 +85,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path):
             time.sleep(0.02)
         workers[0].send_signal(signal.SIGKILL)
         parts = len(list(tmp_path.glob("there/parts/*.parquet")))
-        assert 0 < parts < 8  # in mid-run, and rows had come back by then
+        assert 0 < parts < 4  # in mid-run, and rows had come back by then
         _, error = sweep.communicate(timeout=240)
         assert sweep.returncode == 0, error
     assert (tmp_path / "there/results.parquet").read_bytes() == (tmp_path / "alone/results.parquet").read_bytes()
@@ -117,8 +117,8 @@ def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path)
 @pytest.mark.slow
 def test_a_local_cluster_gives_the_same_bytes(tmp_path):
     scenarios = small_scenario(tmp_path), small_scene(tmp_path)
-    for out, where in (("here", ()), ("there", ("--dask", "local"))):
-        done = run_process("sweep", *scenarios, "--method", "pgm", *where, "--jobs", 2, "--out", out, cwd=tmp_path)
+    for out, run, where in (("here", merge_cosim, ()), ("there", run_process, ("--dask", "local", "--jobs", 2))):
+        done = run("sweep", *scenarios, "--method", "pgm", *where, "--out", out, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
     for name in ("results.parquet", "scenes.csv", "notes.csv"):

@@ -77,7 +77,7 @@ def test_lanes_lie_side_by_side(site: Site) -> None:
 
 
 def test_another_recipe_has_another_place_in_the_cache() -> None:
-    short = SHORT["us101"]
+    short = replace(SHORT["us101"], duration=1.0, warm_up=1.0)
     assert cached_surrogate(short) != cached_surrogate(replace(short, merging=400.0))
 
 
