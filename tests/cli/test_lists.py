@@ -1,0 +1,52 @@
+"""The commands that list, the commands on result folders, and the options that they share."""
+
+import inspect
+import json
+from typing import get_args
+
+import pytest
+from typer.models import OptionInfo
+from typer.testing import CliRunner
+
+from merge_cosim.cli import lists, options, results
+from merge_cosim.core.errors import UserError
+
+runner = CliRunner()
+
+
+def test_the_cache_is_shown_and_cleared(tmp_path):
+    made = tmp_path / "tiles" / "a" / "one.net.xml"
+    made.parent.mkdir(parents=True)
+    made.write_bytes(bytes(2**20))
+    shown = [
+        json.loads(
+            runner.invoke(lists.app, ["cache", "--json", *more], env={"MERGE_COSIM_CACHE": str(tmp_path)}).stdout
+        )
+        for more in ((), ("--clear",), ())
+    ]
+    part = {"part": "tiles", "files": 1, "mib": 1.0}
+    assert [(one["cleared"], one["parts"]) for one in shown] == [(False, [part]), (True, [part]), (False, [])]
+    assert not made.exists()
+
+
+def test_the_table_of_methods_holds_their_parameters():
+    done = runner.invoke(lists.app, ["methods"], env={"COLUMNS": "400"})
+    assert done.exit_code == 0
+    for shown in ("estimator", "controller", "merging car", "headway=1.5", "oracle-best"):
+        assert shown in done.stdout
+
+
+def test_every_shared_option_has_a_help_text():
+    shared = {
+        name: one for name, value in vars(options).items() for one in get_args(value)[1:] if isinstance(one, OptionInfo)
+    }
+    assert {"Data", "Jobs", "Json", "Seed", "Sets"} <= set(shared)
+    assert all(one.help and inspect.cleandoc(one.help).endswith(".") for one in shared.values())
+
+
+@pytest.mark.parametrize("words", [("report", "nothing"), ("compare", "nothing", "nothing")])
+def test_a_folder_without_results_is_refused(tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    done = runner.invoke(results.app, list(words))
+    assert isinstance(done.exception, UserError)
+    assert "nothing/results.parquet: no results here" in str(done.exception)

@@ -1,0 +1,49 @@
+"""Cells and columns of NGSIM files, one by one; tests/ngsim/test_read.py reads whole files."""
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from ngsim_files import car, write_csv
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import FOOT
+from merge_cosim.ngsim.clean import Place, checked, numbers
+from merge_cosim.ngsim.formats import sources
+from merge_cosim.ngsim.rows import needed_columns
+from merge_cosim.ngsim.sites import US101
+
+
+@pytest.fixture
+def place(tmp_path):
+    """The lines 2 to 4 of a file in feet."""
+    (source,) = sources(write_csv(tmp_path / "a.csv", car(1, range(3))))
+    return Place(source, np.arange(2, 5))
+
+
+def column(*cells):
+    return pa.chunked_array([pa.array(cells)])
+
+
+def test_numbers_may_have_commas_between_thousands(place):
+    assert numbers(column("1,234.5", "-2", "3e1"), "Local_Y", place).tolist() == [1234.5, -2.0, 30.0]
+
+
+def test_a_cell_that_is_no_number_is_named_with_its_line(place):
+    with pytest.raises(UserError, match=r"a\.csv, line 3: Local_Y is '1,23', not a number"):
+        numbers(column("1", "1,23", "3"), "Local_Y", place)
+    with pytest.raises(UserError, match=r"line 4: Lane_ID is .*, not a whole number"):
+        checked(column(1.0, 2.0, 2.5), "Lane_ID", "lane", place)
+    with pytest.raises(UserError, match=r"line 2: v_Vel is .*, impossible: outside"):
+        checked(column(-1e6, 0.0, 0.0), "v_Vel", "speed", place)
+
+
+def test_values_are_in_si_units_and_missing_lengths_are_nan(place):
+    assert checked(column(0.0, 10.0, 20.0), "v_Vel", "speed", place) == pytest.approx([0.0, 10 * FOOT, 20 * FOOT])
+    found = checked(column("15", "0", "nan"), "v_Length", "length", place)
+    assert found == pytest.approx([15 * FOOT, np.nan, np.nan], nan_ok=True)
+
+
+def test_only_needed_columns_are_read(place):
+    columns = needed_columns(place.source, US101)
+    assert {"Vehicle_ID", "Frame_ID", "Local_X", "Local_Y", "v_Vel", "Lane_ID"} <= set(columns)
+    assert set(columns) < set(place.source.columns)
