@@ -10,7 +10,7 @@ from merge_cosim.core.units import FOOT
 from merge_cosim.ngsim.clean import Place, checked, numbers
 from merge_cosim.ngsim.formats import sources
 from merge_cosim.ngsim.rows import needed_columns
-from merge_cosim.ngsim.sites import US101
+from merge_cosim.ngsim.sites import site
 
 
 @pytest.fixture
@@ -44,6 +44,6 @@ def test_values_are_in_si_units_and_missing_lengths_are_nan(place):
 
 
 def test_only_needed_columns_are_read(place):
-    columns = needed_columns(place.source, US101)
+    columns = needed_columns(place.source, site("us101"))
     assert {"Vehicle_ID", "Frame_ID", "Local_X", "Local_Y", "v_Vel", "Lane_ID"} <= set(columns)
     assert set(columns) < set(place.source.columns)
