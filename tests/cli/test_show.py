@@ -6,7 +6,8 @@ import json
 import pytest
 import typer
 
-from merge_cosim.cli.progress import resumable, sweep_progress
+from merge_cosim.api.progress import sweep_progress
+from merge_cosim.cli.interrupts import resumable
 from merge_cosim.cli.show import die, print_json, show_table
 from merge_cosim.core.errors import UserError
 
@@ -44,7 +45,8 @@ def test_a_full_disk_is_a_mistake_and_other_errors_stay_what_they_are():
         raise PermissionError(errno.EACCES, "closed")
 
 
-def test_progress_is_silent_where_nobody_looks(capsys):
-    with sweep_progress() as show:
-        show(1, 2, "acc")
+def test_progress_is_silent_at_first_where_there_is_no_terminal(capsys):
+    for shown in (True, False):
+        with sweep_progress(shown) as show:
+            show(1, 2, "acc")
     assert capsys.readouterr() == ("", "")
