@@ -248,8 +248,11 @@ def test_a_listener_refuses_other_conditions(minute, step, several, ramp, expect
     scene = str(folder / "files/traffic.sumocfg")
 
     def drive():
-        libsumo.addStepListener(HostListener(libsumo, ramp, "acc"))
-        libsumo.simulationStep(several)
+        number = libsumo.addStepListener(HostListener(libsumo, ramp, "acc"))
+        try:
+            libsumo.simulationStep(several)
+        finally:
+            libsumo.removeStepListener(number)  # closing SUMO does not
 
     libsumo.start(["sumo", "-c", scene, "--no-step-log", "true", "--step-length", step])
     try:
