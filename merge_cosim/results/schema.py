@@ -65,7 +65,8 @@ COLUMNS = (
         "source",
         TEXT,
         "",
-        "`ngsim`, `surrogate`, `designed` (a grid, or cars of route files), `random` or `traffic`",
+        "`ngsim`, `recorded` (another recording), `surrogate`, `designed` (a grid, or cars of route files), "
+        "`random` or `traffic`",
     ),
     Column("case", TEXT, "", "name of the case; its initial state is in columns of its own"),
     Column("car", TEXT, "", "the logged merging car (`site/recording/vehicle/part`); empty: not from a log"),

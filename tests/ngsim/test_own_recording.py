@@ -13,12 +13,15 @@ import pytest
 from command import merge_cosim, refused, summary
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import shipped
 from merge_cosim.core.units import FOOT
 from merge_cosim.ngsim.data import load_trajectories
 from merge_cosim.ngsim.pairing.encounters import site_encounters
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.read import read_file
 from merge_cosim.ngsim.sites import Site, site
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.simulation.worlds.logged_traffic import logged_road
 
 DOCS = Path(__file__).parents[2] / "docs"
 EXAMPLE = DOCS / "files" / "mona-merge"
@@ -113,6 +116,15 @@ def test_there_is_no_surrogate_of_it(tmp_path: Path, own: Site) -> None:
     scenario.write_text(scenario.read_text().replace('sites = { "merge"', 'sites = { "nowhere"'))
     told = refused("sweep", "own.toml", "--method", "acc", "--out", "out", cwd=tmp_path)
     assert "unknown site 'nowhere': choose i80, us101, or a folder with site.toml" in told
+
+
+def test_full_scenes_find_the_site_of_a_ramp_by_its_folder(tmp_path: Path) -> None:
+    shutil.copytree(shipped("sumo_nets") / "us101", tmp_path / "copy")
+    copied, ours = (logged_road(Ramp.load(name)) for name in (tmp_path / "copy", "us101"))
+    assert copied.strips == ours.strips
+    (tmp_path / "copy" / "site.toml").unlink()
+    with pytest.raises(UserError, match=r"copy/site\.toml: cannot be read"):
+        logged_road(Ramp.load(tmp_path / "copy"))
 
 
 def test_the_commands_of_the_page(tmp_path: Path, mona_dir: Path) -> None:
