@@ -12,11 +12,14 @@ import numpy as np
 import pandas as pd
 from blocks import fill_page, page_parser, table
 
-from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.controllers.acc import Acc
 from merge_cosim.results.store import SCENES_CSV, ResultFolder
-from merge_cosim.sweeps.full_scene_task import SceneReplay
+from merge_cosim.simulation.leader import LeaderRule
+from merge_cosim.sweeps.cases import AS_IN_A_SWEEP, LoggedCases
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.sweep import sweep
+from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 METHODS = ("acc", "slot", "pgm", "fg", "ipcb", "always-go", "always-yield")
 ALONE, LOG, RELEASED, BLIND = "the pair alone", "log", "released", "log, leader not heeded"
@@ -90,22 +93,26 @@ def handed(facts: pd.DataFrame) -> str:
     return f"{facts['released'].mean():.1f} / {facts['blocked'].mean():.1f}"
 
 
-def replay(base: SweepRequest) -> SceneReplay:
+def replay(base: SweepRequest) -> Task:
     """All cases."""
-    (batch,) = plan(replace(base, scenarios=["us101-scene"], methods=["acc"]))
-    assert isinstance(batch, SceneReplay)
-    return batch
+    (task,) = plan(replace(base, scenarios=["us101-scene"], methods=["acc"]))
+    return task
 
 
-def starts(batch: SceneReplay) -> str:
+def starts(task: Task) -> str:
     """Time gaps of the hosts to their leaders at the start."""
-    world = batch.open(Ramp.load(batch.scenario.ramp))
     found: dict[str, list[float]] = {"fragments": [], "episodes": []}
-    for number in range(len(batch)):
-        world.place(np.array([0]), batch.encounters, np.array([number]))
-        gap = world.neighbours.leader_gap / float(world.state[2, 0])
-        found[kind(batch.case(number))].append(gap)
-    world.close()
+    encounters = task.cases.encounters
+    assert encounters is not None
+    (opening,) = task.cases.worlds(task.ramp, 0, WorkerSession(), AS_IN_A_SWEEP, human=False)
+    with opening as (world, _, _):
+        setting = task.setting
+        world.start(encounters, setting, task.scenario.test, LeaderRule(Acc(), setting), 0)
+        for number in range(len(task)):
+            world.place(np.array([0]), np.array([number]))
+            gap = world.leader[0, 0] / float(encounters.host_speed[number])
+            found[kind(task.case(number))].append(gap)
+            world.end_scene()
     lines = []
     for name, gaps in ((name, gaps) for name, gaps in found.items() if gaps):
         led = np.array([gap for gap in gaps if np.isfinite(gap)])
@@ -114,10 +121,10 @@ def starts(batch: SceneReplay) -> str:
     return table(["", "cases", "with a leader", "its time gap, median [s]", "below 1 s", "below 1.5 s"], lines)
 
 
-def fullness(batch: SceneReplay) -> str:
+def fullness(task: Task) -> str:
     """The recordings that hold test pairs: their length, cars, cars at a time, and pairs."""
     lines = []
-    for name, places in groups(batch):
+    for name, places in groups(task):
         scenes = list({scene.recording: scene for scene, _ in places}.values())
         at_start = [len(scene.present(pair.start)) for scene, pair in places]
         lengths = np.array([scene.cycles / 10 for scene in scenes])
@@ -130,10 +137,11 @@ def fullness(batch: SceneReplay) -> str:
     )
 
 
-def groups(batch: SceneReplay) -> Iterator[tuple[str, list]]:
+def groups(task: Task) -> Iterator[tuple[str, list]]:
     """The places of each fragment, and of all episodes together."""
     named: dict[str, list] = {}
-    for place in batch.places:
+    assert isinstance(task.cases, LoggedCases)
+    for place in task.cases.places:
         name = place[0].recording
         named.setdefault("episodes" if name.startswith("episode") else name, []).append(place)
     yield from sorted(named.items(), key=lambda item: (item[0] == "episodes", item[0]))

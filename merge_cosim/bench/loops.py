@@ -19,13 +19,12 @@ import numpy as np
 
 from merge_cosim.controllers.acc import Acc
 from merge_cosim.controllers.law import DistanceKeeping
-from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
-from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.simulation.loop import Effort
-from merge_cosim.sweeps.plan import SweepRequest, plan_encounters
-from merge_cosim.sweeps.task import Batch, WorkerSession
+from merge_cosim.sweeps.plan import SweepRequest, plan
+from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 SCENARIO, METHOD = "designed-2", "acc"
 """What is run: the laws of this scenario and method are the ones that the alternatives spell out."""
@@ -53,18 +52,17 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
     Raises:
         UserError: An alternative's outcome differs from ours, so the times would not compare.
     """
-    batch = _batch(cases)
-    chosen = np.linspace(0, len(batch.encounters) - 1, sample).round().astype(np.int64)
-    ramp = Ramp.load(batch.scenario.ramp)
+    task = _task(cases)
+    chosen = np.linspace(0, len(task) - 1, sample).round().astype(np.int64)
     efforts: list[Effort] = []
     timings: dict[str, list[Timing]] = {name: [] for name in ALTERNATIVES}
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "task.json"
-        file.write_text(json.dumps(_task(batch, ramp, batch.encounters.take(chosen))), encoding="utf-8")
+        file.write_text(json.dumps(_described(task.take(chosen))), encoding="utf-8")
         worker_session = WorkerSession()
-        batch.simulate(worker_session.world(ramp, len(batch.encounters), 0), ramp)  # to warm up
+        task.run(worker_session)  # to warm up
         for _ in range(rounds):
-            run = batch.simulate(worker_session.world(ramp, len(batch.encounters), 0), ramp)
+            ((run, _),) = task.runs(worker_session)
             efforts.append(run.effort)
             ours = tuple((run.columns["kind"][chosen] > 0).tolist())
             for name, script in ALTERNATIVES.items():
@@ -78,7 +76,7 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
     return {
         "scenario": SCENARIO,
         "method": METHOD,
-        "cases": len(batch.encounters),
+        "cases": len(task),
         "sample": sample,
         "vehicle_steps_per_s": round(1e6 / own),
         "us_per_vehicle_step": round(own, 3),
@@ -100,27 +98,28 @@ def highway() -> dict[str, Any] | None:
     }
 
 
-def _batch(cases: int) -> Batch:
-    (batch,) = plan_encounters(SweepRequest([SCENARIO], [METHOD]))
-    n = len(batch.encounters)
-    rows = np.linspace(0, n - 1, min(cases, n)).round().astype(np.int64)
-    return Batch(scenario=batch.scenario, method=batch.method, encounters=batch.encounters.take(rows))
+def _task(cases: int) -> Task:
+    (task,) = plan(SweepRequest([SCENARIO], [METHOD]))
+    n = len(task)
+    return task.take(np.linspace(0, n - 1, min(cases, n)).round().astype(np.int64))
 
 
-def _task(batch: Batch, ramp: Ramp, encounters: Encounters) -> dict[str, Any]:
+def _described(task: Task) -> dict[str, Any]:
     """What the scripts need to know, with the parameters that our own loop uses."""
+    encounters, ramp = task.cases.encounters, task.ramp
+    assert encounters is not None
     states = ("host_station", "host_speed", "merging_station", "merging_speed")
     columns = [getattr(encounters, name).tolist() for name in states]
-    car = batch.scenario.merging_car()
+    car = task.scenario.merging_car()
     assert isinstance(car, DistanceKeeping)
-    rules = batch.scenario.test
+    rules = task.scenario.test
     return {
         "net": str(ramp.net),
         "main_route": list(ramp.main_route),
         "ramp_route": list(ramp.ramp_route),
         "road_length": -ramp.main[0].start,
         "length": float(encounters.host_length[0]),
-        "speed_limit": batch.setting(ramp).speed_limit,
+        "speed_limit": task.setting.speed_limit,
         "horizon": rules.horizon_cycles,
         "time_out": rules.time_out_cycles,
         "host_law": asdict(Acc()),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from merge_cosim.sweeps.plan import SweepRequest, plan
-from merge_cosim.sweeps.scene_task import SceneBatch
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 SCENARIO, METHOD = "traffic-dense", "pgm"
 MODELS = ("Krauss", "IDM", "EIDM")
@@ -28,13 +28,11 @@ def scene_costs(copies: int) -> list[dict[str, Any]]:
 def _cost(model: str, copies: int) -> dict[str, Any]:
     settings = SETTINGS | {"encounters.demand.car_following": model, "encounters.demand.copies": copies}
     (task,) = plan(SweepRequest([SCENARIO], [METHOD], settings=settings))
-    assert isinstance(task, SceneBatch)
-    with task.scene(0) as scene:
-        run = task.simulate(scene)
-    effort, facts = run.effort, run.facts
+    ((run, (facts,)),) = task.runs(WorkerSession())
+    effort = run.effort
     return {
         "model": model,
-        "cars": round(effort.vehicle_steps / (facts["simulated_s"] / task.setting(scene.ramp).dt)),
+        "cars": round(effort.vehicle_steps / (facts["simulated_s"] / task.setting.dt)),
         "hosts": facts["hosts"],
         "meetings": facts["meetings"],
         "real_time_factor": round(facts["simulated_s"] / effort.wall_s, 1),

@@ -15,7 +15,7 @@ from merge_cosim.core.units import DT
 from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.sweeps.plan import default_model
-from merge_cosim.sweeps.task import TILES
+from merge_cosim.sweeps.worker_session import TILES
 
 CYCLES = 60
 """Cycles of each timed run: six seconds of an approach."""

@@ -6,6 +6,9 @@ import numpy as np
 
 from merge_cosim.core.units import DT, TOLERANCE, BoolArray, FloatArray, time_to_arrival
 
+DECIMALS = 6
+"""What is observed is rounded to 1e-6 m and m/s: the designed grid is full of ties that the last bits would break."""
+
 
 @dataclass(frozen=True)
 class Setting:

@@ -19,8 +19,9 @@ from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER, PUBLISHED
 from merge_cosim.report.tables import Section
 from merge_cosim.report.traffic_table import traffic_table
 from merge_cosim.results.statistics.comparison import reference_of
-from merge_cosim.results.statistics.summary import ALL_SITES, GROUP, TRAFFIC, compare_all
+from merge_cosim.results.statistics.summary import ALL_SITES, GROUP, compare_all
 from merge_cosim.results.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, ResultFolder
+from merge_cosim.simulation.worlds.traffic import TRAFFIC
 
 REPORT = "report.html"
 SOURCES = {

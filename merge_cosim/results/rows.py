@@ -11,11 +11,11 @@ from merge_cosim.controllers.law import FreeDriving
 from merge_cosim.core.encounter import NEVER, Encounters, Intention
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, time_to_arrival
-from merge_cosim.results.schema import SCHEMA, SUMO
+from merge_cosim.results.schema import SCHEMA
 from merge_cosim.scoring.decisions import GATES
 from merge_cosim.scoring.scoring import GOAL, KINDS
+from merge_cosim.scoring.surroundings import MEASURES
 from merge_cosim.simulation.loop import Run
-from merge_cosim.simulation.worlds.logged import AROUND
 
 
 def result_rows(
@@ -24,8 +24,6 @@ def result_rows(
     setting: Setting,
     free_law: FreeDriving,
     names: dict[str, str],
-    more: Mapping[str, AnyArray | pa.Array] = {},
-    world: str = SUMO,
 ) -> pa.Table:
     """Return the result rows of a run.
 
@@ -35,8 +33,6 @@ def result_rows(
         setting: Speed limit and cycle.
         free_law: The free driving that the delay is measured against.
         names: `scenario`, `variation`, `method` and `model` of all rows.
-        more: Further columns, or others in their place, shape (n,) each; the columns of scenes are missing without.
-        world: What moved the cars, `SUMO` or `CLOSED_FORM`.
     """
     c, n, dt = run.columns, len(encounters), setting.dt
     failed = c["kind"] > 0
@@ -52,8 +48,7 @@ def result_rows(
         last_logged = encounters.log.merging_station.lengths - 1
         score_until = encounters.log.score_until
     unfinished = ~failed & ~c["scored_to_end"]
-    cut_off = unfinished & ((c["end_cycle"] >= score_until) | (c["scored_from"] >= 0))
-    censored = more.get("censored", cut_off)
+    censored = unfinished & c.get("cut_off", (c["end_cycle"] >= score_until) | (c["scored_from"] >= 0))
     reached = ~np.isnan(c["host_reached_s"]) | (encounters.host_station >= 0)
     columns: dict[str, AnyArray | pa.Array] = {
         "site": encounters.site,
@@ -97,10 +92,10 @@ def result_rows(
             - time_to_arrival(encounters.host_station, encounters.host_speed)
         ),
         "sumo_collision": c["sumo_collision"].astype(bool),
-        **{name: _finite(c[name]) for name in AROUND if name in c},
-        **more,
+        **{name: _finite(c[name]) for name in MEASURES if name in c},
+        **{name: c[name] for name in ("merging_stopped",) if name in c},
     }
-    constant = {**names, "world": world}
+    constant = {**names, "world": run.world}
     arrays = []
     for column in SCHEMA:
         if column.name in constant:

@@ -14,8 +14,6 @@ SCHEMA_VERSION = "4"
 VERSION_KEY = b"merge_cosim_schema"
 KEY = [("scenario", "ascending"), ("variation", "ascending"), ("case", "ascending"), ("method", "ascending")]
 """The columns that name a row, in the order in which rows are sorted."""
-SUMO, CLOSED_FORM = "sumo", "closed-form"
-"""What moves the cars: values of the column `world`."""
 
 TEXT, FLAG, NUMBER, COUNT = pa.string(), pa.bool_(), pa.float64(), pa.int32()
 

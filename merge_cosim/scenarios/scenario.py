@@ -25,7 +25,7 @@ from merge_cosim.merging_cars.base import MergingCar, merging_cars
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ramps.ramp import ramp_names
 from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Span, Strict, Table, Traffic
-from merge_cosim.scoring.scoring import Rules
+from merge_cosim.scoring.rules import Rules
 from merge_cosim.simulation.worlds.logged_rules import FullScene
 from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.demand import Demand

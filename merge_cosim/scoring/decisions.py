@@ -14,9 +14,9 @@ GATES = (110, 70, 40, 20)
 def decisions(tracks: Tracks) -> dict[str, FloatArray]:
     """The decisions and beliefs while neither car has reached the merging point, shape (m,) each.
 
-    `last_decision`: 1 NOT_YIELD, 0 YIELD, -1 none; `decided_from`: the cycle since which it stands; `log_odds_G` and
-    `arrival_lead_G` (T_h - T_m [s]): of the first cycle in which the merging car is G m away or less, NaN where it
-    started nearer or a car was through.
+    `last_decision`: 1 NOT_YIELD, 0 YIELD, -1 none (also where the log-odds are NaN); `decided_from`: the cycle since
+    which it stands; `log_odds_G` and `arrival_lead_G` (T_h - T_m [s]): of the first cycle in which the merging car is G
+    m away or less, NaN where it started nearer or a car was through.
     """
     states, age = tracks.states, tracks.age
     still_open = np.maximum(states.host_station, states.merging_station) < -TOLERANCE
@@ -26,7 +26,8 @@ def decisions(tracks: Tracks) -> dict[str, FloatArray]:
     flips = np.zeros(len(at), dtype=bool)
     flips[1:] = (not_yield[1:] != not_yield[:-1]) & (whose[1:] == whose[:-1])
     last_decision, decided_from, decision_flips = tracks.fill(-1.0), tracks.fill(0.0), tracks.fill(0.0)
-    last_decision[whose] = not_yield  # of each encounter's the last one stays
+    believed = tracks.log_odds[at]
+    last_decision[whose] = np.where(np.isnan(believed), -1.0, not_yield)  # the last one of each encounter stays
     decided_from[whose[flips]] = age[at[flips]]
     np.add.at(decision_flips, whose[flips], 1.0)
     kept = {"decision_flips": decision_flips, "last_decision": last_decision, "decided_from": decided_from}

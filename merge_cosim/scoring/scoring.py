@@ -1,107 +1,21 @@
-"""Scoring: when an encounter is over; then failure, the bumpers' crossings, gaps, time to collision, braking, jerk."""
+"""The measures of encounters: failure, the bumpers' crossings, gaps, time to collision, braking, jerk."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Annotated, Literal
-
 import numpy as np
-from pydantic import Field
 
-from merge_cosim.controllers.law import FreeDriving
-from merge_cosim.core.encounter import NEVER, Encounters, ReplayLog
-from merge_cosim.core.observation import Observation
-from merge_cosim.core.units import DT, TOLERANCE, AnyArray, BoolArray, FloatArray, IntArray
+from merge_cosim.core.encounter import ReplayLog
+from merge_cosim.core.units import DT, TOLERANCE, AnyArray, FloatArray
 from merge_cosim.scoring.decisions import decisions
 from merge_cosim.scoring.human_difference import human_difference
+from merge_cosim.scoring.rules import Rules
+from merge_cosim.scoring.surroundings import surroundings
 from merge_cosim.scoring.tracks import Tracks
 
 KINDS = ("", "side", "host_into_merging", "merging_into_host", "host_into_leader")
 SIDE, HOST_INTO_MERGING, MERGING_INTO_HOST, HOST_INTO_LEADER = 1, 2, 3, 4
 GOAL = 50.0
 """Station [m] at which the delay is taken."""
-USUAL_ACCELERATION = 1.0
-"""Acceleration [m/s^2] by which the length of a case is guessed."""
-
-_Seconds = Annotated[float, Field(gt=0, le=3600)]  # every cycle until then has room in the memory
-
-
-@dataclass(frozen=True)
-class Rules:
-    """When an encounter is scored.
-
-    Attributes:
-        horizon: Time [s] scored from the first cycle on in which both cars have reached the merging point.
-        time_out: Longest run [s].
-        overlap_from: `both`: scored once both cars are past the merging point; `lane_change`: once the merging car is.
-        free: The free driving that delays are measured against, whatever method drives.
-    """
-
-    horizon: _Seconds = 3.0
-    time_out: _Seconds = 40.0
-    overlap_from: Literal["both", "lane_change"] = "both"
-    free: FreeDriving = field(default_factory=FreeDriving)
-
-    @property
-    def horizon_cycles(self) -> int:
-        """Cycles of the horizon."""
-        return round(self.horizon / DT)
-
-    @property
-    def time_out_cycles(self) -> int:
-        """Cycles of the longest run."""
-        return round(self.time_out / DT)
-
-    def begun(self, now: Observation) -> BoolArray:
-        """Where the cars stand so that scoring begins."""
-        if self.overlap_from == "both":
-            return np.minimum(now.host_station, now.merging_station) >= -TOLERANCE
-        return now.merging_in_lane
-
-
-def expected_cycles(encounters: Encounters, rules: Rules) -> FloatArray:
-    """Rough length of each case: both cars accelerate to the merging point, then it is scored; shape (n,)."""
-    arrivals = [
-        (np.sqrt(speed**2 + 2 * USUAL_ACCELERATION * np.maximum(-station, 0.0)) - speed) / USUAL_ACCELERATION
-        for station, speed in (
-            (encounters.host_station, encounters.host_speed),
-            (encounters.merging_station, encounters.merging_speed),
-        )
-    ]
-    expected: FloatArray = np.minimum(np.maximum(*arrivals) + rules.horizon, rules.time_out) / DT
-    return expected
-
-
-class Watch:
-    """Tells, cycle by cycle, which encounters of a batch are over: this alone must be known at once."""
-
-    def __init__(self, count: int, rules: Rules) -> None:
-        self._rules = rules
-        self._horizon, self._time_out = rules.horizon_cycles, rules.time_out_cycles
-        self._until = np.full(count, NEVER)
-        self._scored = np.zeros(count, dtype=bool)
-
-    def reset(self, rows: IntArray, limit: IntArray) -> None:
-        """Begin anew at `rows`, each to be scored until cycle `limit` at most."""
-        self._until[rows] = np.minimum(limit, self._time_out)
-        self._scored[rows] = False
-
-    def over(self, age: IntArray, now: Observation) -> BoolArray:
-        """Where an encounter has failed, its horizon has been seen, or its time is up; `age` is the cycle of `now`."""
-        begins = self._rules.begun(now) > self._scored
-        if np.count_nonzero(begins):
-            self._scored[begins] = True
-            self._until[begins] = np.minimum(self._until[begins], age[begins] + self._horizon)
-        return (age >= self._until) | (self._scored & (now.gap < -TOLERANCE))
-
-
-def ends(tracks: Tracks, rules: Rules) -> IntArray:
-    """The cycles in which encounters were over that were recorded beyond that, by the rules of `Watch`; shape (m,)."""
-    start = tracks.reached(rules.begun(tracks.states) & (tracks.age > 0))
-    scored = tracks.age >= start[tracks.encounter]
-    failed = tracks.reached(scored & (tracks.states.gap < -TOLERANCE))
-    longest = np.minimum(tracks.cycles, rules.time_out_cycles)
-    return np.minimum(np.minimum(start + rules.horizon_cycles, failed), longest)
 
 
 def score(tracks: Tracks, rules: Rules, log: ReplayLog | None = None) -> dict[str, AnyArray]:
@@ -112,7 +26,7 @@ def score(tracks: Tracks, rules: Rules, log: ReplayLog | None = None) -> dict[st
     front or (cleared) the rear bumper passes station 0, or the host's front `GOAL`.
     """
     states, last = tracks.states, tracks.last
-    return {
+    measures = {
         "end_cycle": tracks.cycles,
         "end_station": states.host_station[last],
         "end_speed": states.host_speed[last],
@@ -123,7 +37,12 @@ def score(tracks: Tracks, rules: Rules, log: ReplayLog | None = None) -> dict[st
         **_braking(tracks),
         **decisions(tracks),
         **human_difference(tracks, log),
+        **surroundings(tracks),
     }
+    if "min_leader_gap_m" in measures:
+        hit = (measures["kind"] == 0) & (measures["min_leader_gap_m"] < -TOLERANCE)
+        measures["kind"] = np.where(hit, HOST_INTO_LEADER, measures["kind"])
+    return measures
 
 
 def _braking(tracks: Tracks) -> dict[str, FloatArray]:

@@ -1,9 +1,9 @@
-"""What the encounters of a batch go through: recorded cycle by cycle, laid end to end when they are over."""
+"""Recorded encounters laid end to end: what every measure is computed from."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,54 +12,10 @@ from merge_cosim.core.encounter import NEVER, Encounters
 from merge_cosim.core.observation import Observation
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 
-DECIMALS = 6
-"""What is observed is rounded to 1e-6 m and m/s: the designed grid is full of ties that the last bits would break."""
-
-
-class Recorder:
-    """Keeps the last cycles of all encounters of a batch, as many as the longest encounter has.
-
-    Attributes:
-        lengths: Lengths of hosts and merging cars [m], shape (2, count).
-    """
-
-    def __init__(self, count: int, longest: int) -> None:
-        """Make room for `count` encounters of at most `longest` cycles."""
-        self.lengths = np.ones((2, count))
-        self._cycles = np.zeros((longest + 1, 5, count))
-        shown = self._cycles.view()
-        shown.flags.writeable = False
-        self._seen = [
-            Observation(host, host_speed, merging, merging_speed, *self.lengths)
-            for host, merging, host_speed, merging_speed, _ in shown
-        ]
-        self._now = 0
-
-    @property
-    def seen(self) -> Observation:
-        """The present cycle, rounded; it is made once for all, and shows what is placed later in the same cycle."""
-        return self._seen[self._now]
-
-    def believed(self, log_odds: FloatArray) -> None:
-        """Keep the beliefs of the present cycle, shape (count,)."""
-        self._cycles[self._now, 4] = log_odds
-
-    def moved(self, state: FloatArray) -> None:
-        """Go on to the next cycle, with the world's state."""
-        self._now = (self._now + 1) % len(self._cycles)
-        state.round(DECIMALS, out=self._cycles[self._now, :4])
-
-    def placed(self, rows: IntArray, start: FloatArray) -> None:
-        """Begin encounters at `rows` in the present cycle, from `Encounters.start`; the old ones' last state goes."""
-        self._cycles[self._now][:4, rows] = start[:4].round(DECIMALS)
-        self.lengths[:, rows] = start[4:]
-
-    def track(self, row: int, cycles: int) -> FloatArray:
-        """The states and beliefs of the last `cycles` cycles at a row, and the present one; shape (5, cycles + 1)."""
-        first, now = self._now - cycles, self._now + 1
-        if first >= 0:
-            return self._cycles[first:now, :, row].T.copy()
-        return np.concatenate([self._cycles[first:, :, row].T, self._cycles[:now, :, row].T], axis=1)
+HOST_STATION, MERGING_STATION, HOST_SPEED, MERGING_SPEED, LOG_ODDS, COMMAND = range(6)
+"""Rows of a recorded track: the state [m, m/s], the log-odds, the host's commanded speed [m/s]; then what the world
+records of the cars around."""
+RECORDED = 6
 
 
 @dataclass(frozen=True)
@@ -71,24 +27,38 @@ class Tracks:
         log_odds: The belief in each state; an encounter's last state has none, and what stands there means nothing.
         case: Index of each encounter's case, shape (m,).
         cycles: Number of cycles of each encounter, at least 1, one less than it has states; shape (m,).
+        around: What the world recorded beside the states, by channel, shape (N,) each.
     """
 
     states: Observation
     log_odds: FloatArray
     case: IntArray
     cycles: IntArray
+    around: dict[str, FloatArray] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, encounters: Encounters, cases: Sequence[int], tracks: Sequence[FloatArray]) -> Tracks:
-        """Lay the recorded `tracks` of `cases` end to end."""
+    def of(
+        cls,
+        encounters: Encounters,
+        cases: Sequence[int],
+        tracks: Sequence[FloatArray],
+        channels: Sequence[str] = (),
+    ) -> Tracks:
+        """Lay the recorded tracks of some cases end to end.
+
+        Args:
+            encounters: All encounters.
+            cases: Indices of the recorded ones.
+            tracks: Their records, shape (RECORDED + channels, cycles + 1) each.
+            channels: Names of what the world recorded beside the states.
+        """
         case = np.array(cases, dtype=np.int64)
         sizes = np.array([track.shape[1] for track in tracks], dtype=np.int64)
-        host_station, merging_station, host_speed, merging_speed, log_odds = np.concatenate(
-            [np.empty((5, 0)), *tracks], axis=1
-        )
+        rows = np.concatenate([np.empty((RECORDED + len(channels), 0)), *tracks], axis=1)
         lengths = np.repeat(encounters.start[4:, case], sizes, axis=1)
-        states = Observation(host_station, host_speed, merging_station, merging_speed, *lengths)
-        return cls(states, log_odds, case, sizes - 1)
+        states = Observation(rows[HOST_STATION], rows[HOST_SPEED], rows[MERGING_STATION], rows[MERGING_SPEED], *lengths)
+        around = dict(zip(channels, rows[RECORDED:], strict=True))
+        return cls(states, rows[LOG_ODDS], case, sizes - 1, around)
 
     @cached_property
     def last(self) -> IntArray:
@@ -113,12 +83,6 @@ class Tracks:
     def reached(self, where: BoolArray) -> IntArray:
         """The first cycle of each encounter in which something holds; `NEVER` if in none. Shape (m,)."""
         return np.minimum.reduceat(np.where(where, self.age, NEVER), self.first)
-
-    def until(self, cycles: IntArray) -> Tracks:
-        """The encounters up to the given cycles, shape (m,)."""
-        kept = self.age <= cycles[self.encounter]
-        states = Observation(*(getattr(self.states, field.name)[kept] for field in fields(Observation)))
-        return Tracks(states, self.log_odds[kept], self.case, cycles)
 
     def fill(self, value: float) -> FloatArray:
         """A measure with the same value for every encounter, shape (m,)."""

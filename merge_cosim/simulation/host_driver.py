@@ -1,6 +1,9 @@
-"""A host's driver: from what is seen to the log-odds and the acceleration."""
+"""A method that drives hosts: from what is observed to the log-odds and the acceleration."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -9,7 +12,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import Keys
 from merge_cosim.core.registry import Component
-from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.estimators.base import Estimator
 
 
@@ -42,10 +45,44 @@ class HostDriver:
         return log_odds, _numbers(acceleration, self.controller, seen)
 
 
+class DriverBlocks:
+    """Copies of a method, each for `size` slots, so that slots can be added while it runs."""
+
+    def __init__(self, driver: HostDriver, size: int, setting: Setting) -> None:
+        self._driver, self._size, self._setting = driver, size, setting
+        self._blocks: list[HostDriver] = []
+
+    def make_room(self, slots: int) -> None:
+        """Start as many blocks as the slots need."""
+        while len(self._blocks) * self._size < slots:
+            block = deepcopy(self._driver)
+            block.start(self._size, self._setting)
+            self._blocks.append(block)
+
+    def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
+        """See `HostDriver.reset`."""
+        for number, block in enumerate(self._blocks):
+            own = np.flatnonzero(rows // self._size == number)
+            if len(own):
+                block.reset(rows[own] - number * self._size, labels[own], keys[own])
+
+    def decide(self, seen: Observation, active: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """See `HostDriver.decide`; blocks without an active slot are left out, and their entries mean nothing."""
+        if len(self._blocks) == 1 and np.count_nonzero(active):
+            return self._blocks[0].decide(seen)
+        log_odds, acceleration = np.zeros((2, len(active)))
+        for number, block in enumerate(self._blocks):
+            own = slice(number * self._size, (number + 1) * self._size)
+            if np.count_nonzero(active[own]):
+                part = Observation(*(getattr(seen, field.name)[own] for field in fields(Observation)))
+                log_odds[own], acceleration[own] = block.decide(part)
+        return log_odds, acceleration
+
+
 def _numbers(values: FloatArray, component: Component, seen: Observation) -> FloatArray:
     n = len(seen.host_station)
     missing = np.isnan(values)
-    if missing.shape == (n,) and not np.count_nonzero(missing):  # the two cheapest questions: they are asked each cycle
+    if missing.shape == (n,) and not np.count_nonzero(missing):  # the two cheapest checks: each cycle makes them
         return values
     who = type(component).__name__
     if missing.shape != (n,):

@@ -1,23 +1,25 @@
-"""The co-simulation loop: ten times a second observe, estimate, decide and command, for a whole batch at once."""
+"""The co-simulation loop: each cycle observe, estimate, decide and command, for all slots of a world at once."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Container
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
+import pandas as pd
 
-from merge_cosim.core.encounter import NEVER, Encounters
-from merge_cosim.core.observation import Observation, Setting
-from merge_cosim.core.random_streams import stream_keys
-from merge_cosim.core.units import DT, AnyArray, FloatArray, IntArray
+from merge_cosim.core.encounter import Encounters
+from merge_cosim.core.observation import Setting
+from merge_cosim.core.units import AnyArray, FloatArray
 from merge_cosim.merging_cars.base import MergingCar
-from merge_cosim.scoring.scoring import Rules, Watch, expected_cycles, score
-from merge_cosim.scoring.tracks import Recorder, Tracks
-from merge_cosim.simulation.host_driver import HostDriver
-from merge_cosim.simulation.worlds.tiles import World
+from merge_cosim.scoring.rules import Rules, Watch
+from merge_cosim.scoring.scoring import score
+from merge_cosim.scoring.tracks import Tracks
+from merge_cosim.simulation.host_driver import DriverBlocks, HostDriver
+from merge_cosim.simulation.leader import LeaderRule
+from merge_cosim.simulation.recording import Recorder, trace_of
+from merge_cosim.simulation.worlds.base import Ended, World
 
 SCORED_TOGETHER = 128
 """Encounters that are over wait until so many can be scored in one go; their tracks then still fit the cache."""
@@ -31,7 +33,7 @@ class Effort:
         vehicle_steps: Vehicles times steps of running encounters.
         encounter_cycles: Cycles of running encounters.
         wall_s: Time in the loop [s].
-        step_s: Of it, inside SUMO's steps [s].
+        step_s: Of it, inside the steps of SUMO [s].
         method_s: Of it, in estimating and controlling [s].
         scene_s: Simulated time of scenes [s].
         worst_difference_m: Largest difference of the world's stations from the closed form, at an encounter's end [m].
@@ -61,158 +63,206 @@ class Run:
     """What came out of a batch of n encounters.
 
     Attributes:
-        columns: All measures of `score`, and `sumo_collision`; shape (n,) each.
+        encounters: The encounters.
+        columns: All measures of `score`, `sumo_collision`, and what the world adds; shape (n,) each.
         effort: What it cost.
-        traces: For each traced case, cycle by cycle: `host_station`, `log_odds`, ...
+        world: What moved the cars, see `World.kind`.
+        traces: For each traced encounter, by name, one row per cycle; see `trace_of`.
     """
 
+    encounters: Encounters
     columns: dict[str, AnyArray]
     effort: Effort
-    traces: dict[int, dict[str, list[float]]] = field(default_factory=dict)
+    world: str
+    traces: dict[str, pd.DataFrame] = field(default_factory=dict)
+
+
+class Everything(Container[str]):
+    """Holds every name: to trace all encounters."""
+
+    def __contains__(self, name: object) -> bool:
+        return True
 
 
 def simulate(
     world: World,
-    encounters: Encounters,
+    encounters: Encounters | None,
     driver: HostDriver,
     merging_car: MergingCar,
     rules: Rules,
     setting: Setting,
-    traced: Sequence[int] = (),
+    traced: Container[str] = (),
     seed: int = 0,
 ) -> Run:
-    """Run all encounters, `world.count` at a time, each until it is scored, fails or times out.
+    """Run encounters in a world, each until it is scored, fails or times out.
 
-    Nothing that a case goes through depends on its tile or on its neighbours, so the outcome of a case is the same
-    whatever the batch and the number of tiles.
+    Nothing that an encounter goes through depends on its slot or on its neighbours, so its outcome is the same
+    whatever the batch and the number of slots.
 
     Args:
         world: What moves the cars.
-        encounters: The n cases.
+        encounters: The n encounters; None for a world that finds its encounters.
         driver: The host's method.
         merging_car: How the merging cars drive.
-        rules: When a case is scored.
+        rules: When an encounter is scored.
         setting: Speed limit and cycle.
-        traced: Indices of the cases to record cycle by cycle.
-        seed: Seed of the random streams, one per case.
+        traced: Names of the encounters to record cycle by cycle.
+        seed: Seed of the random streams, one per encounter.
     """
-    return _Loop(world, encounters, driver, merging_car, rules, setting, frozenset(traced), seed).run()
+    return Loop(world, encounters, driver, merging_car, rules, setting, traced, seed).run()
 
 
-class _Loop:
+class Loop:
+    """A run in progress. `before_step` and `after_step` enclose the step, for a caller that makes the steps itself."""
+
     def __init__(
         self,
         world: World,
-        encounters: Encounters,
+        encounters: Encounters | None,
         driver: HostDriver,
         merging_car: MergingCar,
         rules: Rules,
         setting: Setting,
-        traced: frozenset[int],
-        seed: int,
+        traced: Container[str] = (),
+        seed: int = 0,
     ) -> None:
-        count, n = world.count, len(encounters)
-        self.world, self.encounters, self.driver, self.merging_car = world, encounters, driver, merging_car
-        self.rules, self.setting, self.traced = rules, setting, traced
-        self.recorder = Recorder(count, rules.time_out_cycles)
-        self.watch = Watch(count, rules)
-        self.closed_form = np.zeros((2, count))
-        self.effort = Effort()
-        self.traces: dict[int, dict[str, list[float]]] = {case: defaultdict(list) for case in traced}
-        driver.start(count, setting)
-        merging_car.start(encounters, count, setting)
-        self.keys = stream_keys(encounters.case, seed)
-        self.case = np.full(count, -1)
-        self.age = np.zeros(count, dtype=np.int64)
-        self.score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
-        self.speeds = np.zeros((2, count))
-        self.queue = np.argsort(-expected_cycles(encounters, rules), kind="stable")  # so that all tiles end together
-        self.over: dict[int, FloatArray] = {}
-        self.columns: dict[str, AnyArray] = {"sumo_collision": np.zeros(n, dtype=bool)}
+        """Make ready; see `simulate`."""
+        self._world, self._merging_car, self._setting, self._rules = world, merging_car, setting, rules
+        self._traced = traced
+        self._leader = LeaderRule(driver.controller, setting)
+        world.start(encounters, setting, rules, self._leader, seed)
+        self._found = encounters is None
+        if encounters is not None:
+            merging_car.start(encounters, world.slots, setting)
+        self._driver = DriverBlocks(driver, world.slots, setting)
+        self._recorder = Recorder(world.slots, rules.time_out_cycles, len(world.channels))
+        self._watch = Watch(world.slots, rules)
+        self._age, self._over_at = np.zeros((2, 0), dtype=np.int64)
+        self._active, self._open = np.zeros((2, 0), dtype=bool)
+        self._make_room()
+        self._effort, self._stepped = Effort(), world.step_s
+        self._over: dict[int, FloatArray] = {}
+        self._columns: dict[str, AnyArray] = {}
+        self._traces: dict[str, pd.DataFrame] = {}
 
     def run(self) -> Run:
-        begin, stepped = perf_counter(), self.world.step_s
-        self._refill(np.arange(self.world.count))
-        while np.count_nonzero(self.active):
-            self._cycle()
-        self._score()
-        self.effort.wall_s = perf_counter() - begin
-        self.effort.step_s = self.world.step_s - stepped
-        return Run(self.columns, self.effort, {case: dict(trace) for case, trace in self.traces.items()})
-
-    def _cycle(self) -> None:
+        """Run to the end."""
         begin = perf_counter()
-        now = self.recorder.seen
-        observed = self.merging_car.observed_speed(self.age, now.merging_speed)
+        self._begin()
+        while self._world.goes_on:
+            self.before_step()
+            self._world.step()
+            self.after_step()
+        run = self.finish()
+        run.effort.wall_s = perf_counter() - begin
+        return run
+
+    def before_step(self) -> None:
+        """Estimate, decide and command."""
+        begin = perf_counter()
+        now, world = self._recorder.seen, self._world
+        observed = self._merging_car.observed_speed(self._age, now.merging_speed)
         seen = now if observed is now.merging_speed else replace(now, merging_speed=observed)
-        log_odds, acceleration = self.driver.decide(seen)
-        np.maximum(now.host_speed + acceleration * self.setting.dt, 0.0, out=self.speeds[0])
-        decided = perf_counter()
-        self.speeds[1] = self.merging_car.next_speed(self.age, now)
-        self.speeds *= self.active
-        self.recorder.believed(log_odds)
-        if self.traced:
-            self._trace(now, log_odds, self.speeds[0])
-        self.world.advance(self.speeds)
-        self.closed_form += self.speeds * DT
-        self.recorder.moved(self.world.state)
-        self.age += 1
-        self.effort.method_s += decided - begin
-        rows = np.flatnonzero(self.active & self.watch.over(self.age, self.recorder.seen))
-        if len(rows):
-            self._finish(rows)
-            self._refill(rows)
+        log_odds, acceleration = self._driver.decide(seen, self._active)
+        if world.leader is not None:
+            acceleration = self._leader.cap(acceleration, now.host_speed, world.leader)
+        np.maximum(now.host_speed + acceleration * self._setting.dt, 0.0, out=self._speeds[0])
+        self._effort.method_s += perf_counter() - begin
+        self._speeds[1] = self._merging_car.next_speed(self._age, now)
+        self._speeds *= self._active
+        world.command(self._speeds)
+        self._recorder.decided(log_odds, self._speeds[0])
 
-    def _refill(self, rows: IntArray) -> None:
-        cases, self.queue = self.queue[: len(rows)], self.queue[len(rows) :]
-        self.case[rows[len(cases) :]] = -1
-        rows = rows[: len(cases)]
-        self.case[rows], self.age[rows] = cases, 0
-        self.active = self.case >= 0
-        if not len(rows):
+    def after_step(self) -> None:
+        """Observe, end what is over and begin what comes next."""
+        world = self._world
+        world.observe(*self._recorder.next_cycle())
+        self._age += 1
+        over = np.flatnonzero(self._open & self._watch.over(self._age, self._recorder.seen))
+        if len(over):
+            self._over_at[over] = self._age[over]
+            self._open[over] = False
+        if ended := world.ended(over, self._age):
+            self._finish(ended)
+        if ended or self._found:
+            self._begin()
+
+    def finish(self) -> Run:
+        """End what is still open, score, and return what came out."""
+        if ended := self._world.finish(self._age):
+            self._finish(ended)
+        self._score()
+        world, effort = self._world, self._effort
+        if world.vehicle_steps is not None:
+            effort.vehicle_steps = world.vehicle_steps
+        effort.step_s = world.step_s - self._stepped
+        effort.worst_difference_m = world.worst_difference_m
+        return Run(world.encounters, self._columns | world.columns(), effort, world.kind, self._traces)
+
+    def _make_room(self) -> None:
+        """Grow with the world, which may add slots."""
+        slots = self._world.slots
+        more = slots - len(self._age)
+        if self._found:
+            self._recorder.make_room(slots, int((self._age * self._active).max(initial=0)) + 1)
+        if not more:
             return
-        self.world.place(rows, self.encounters, cases)
-        start = self.encounters.start[:, cases]
-        self.closed_form[:, rows] = start[:2]
-        self.recorder.placed(rows, start)
-        self.merging_car.reset(rows, cases)
-        self.driver.reset(rows, self.encounters.label[cases], self.keys[cases])
-        self.watch.reset(rows, self.score_until[cases])
+        self._driver.make_room(slots)
+        self._watch.make_room(slots)
+        self._age, self._over_at = np.pad((self._age, self._over_at), ((0, 0), (0, more)))
+        self._active, self._open = np.pad((self._active, self._open), ((0, 0), (0, more)))
+        self._speeds = np.zeros((2, slots))
 
-    def _finish(self, rows: IntArray) -> None:
-        cases = self.case[rows]
-        apart = np.abs(self.world.state[:2, rows] - self.closed_form[:, rows]).max()  # what came between them stays
-        self.effort.worst_difference_m = max(self.effort.worst_difference_m, float(apart))
-        self.columns["sumo_collision"][cases] = self.world.collided[rows]
-        for case, row, cycles in zip(cases.tolist(), rows.tolist(), self.age[rows].tolist(), strict=True):
-            self.over[case] = self.recorder.track(row, cycles)
-        if len(self.over) >= SCORED_TOGETHER:
+    def _begin(self) -> None:
+        begun = self._world.begin()
+        if self._found:
+            self._make_room()
+        if begun is None:
+            return
+        slots = begun.slots
+        self._age[slots] = 0
+        self._active[slots] = self._open[slots] = True
+        self._over_at[slots] = -1
+        self._recorder.begun(slots, begun.start, begun.around)
+        self._driver.reset(slots, begun.labels, begun.keys)
+        self._watch.reset(slots, begun.score_until)
+        if not self._found:
+            self._merging_car.reset(slots, begun.cases)
+
+    def _finish(self, ended: Ended) -> None:
+        """Take the tracks of encounters that have ended."""
+        slots = ended.slots
+        self._active[slots] = self._open[slots] = False
+        valid, over_at = self._age[slots] - ended.back, self._over_at[slots]
+        last = np.where(over_at >= 0, np.minimum(over_at, valid), valid)
+        for number, (slot, case, end) in enumerate(
+            zip(slots.tolist(), ended.cases.tolist(), last.tolist(), strict=True)
+        ):
+            name = str(ended.names[number])
+            if case < 0 and name not in self._traced:
+                continue
+            track = self._recorder.track(slot, int(self._age[slot]))[:, : end + 1]
+            if ended.points is not None:
+                track = self._world.settled(track, float(ended.points[number]))
+            if case >= 0:
+                self._over[case] = track
+            if name in self._traced:
+                begun_at = 0.0 if ended.begun_at is None else float(ended.begun_at[number])
+                self._traces[name] = trace_of(track, self._world.channels, begun_at)
+        self._age[slots] = 0
+        if len(self._over) >= SCORED_TOGETHER and not self._found:
             self._score()
 
     def _score(self) -> None:
         """Score the encounters that are over and forget their tracks."""
-        if not self.over:
+        encounters = self._world.encounters
+        if not self._over and self._columns:
             return
-        tracks = Tracks.of(self.encounters, list(self.over), list(self.over.values()))
-        self.over.clear()
-        for name, values in score(tracks, self.rules, self.encounters.log).items():
-            column = self.columns.setdefault(name, np.empty(len(self.encounters), dtype=values.dtype))
+        tracks = Tracks.of(encounters, list(self._over), list(self._over.values()), self._world.channels)
+        self._over.clear()
+        for name, values in score(tracks, self._rules, encounters.log).items():
+            column = self._columns.setdefault(name, np.empty(len(encounters), dtype=values.dtype))
             column[tracks.case] = values
-        cycles = int(tracks.cycles.sum())
-        self.effort.encounter_cycles += cycles
-        self.effort.vehicle_steps += 2 * cycles
-
-    def _trace(self, now: Observation, log_odds: FloatArray, next_speed: FloatArray) -> None:
-        for row in np.flatnonzero(np.isin(self.case, list(self.traced))).tolist():
-            trace = self.traces[int(self.case[row])]
-            for name, value in (
-                ("time_s", round(self.age[row] * self.setting.dt, 9)),
-                ("host_station_m", now.host_station[row]),
-                ("host_speed_m_s", now.host_speed[row]),
-                ("host_acceleration_m_s2", (next_speed[row] - now.host_speed[row]) / self.setting.dt),
-                ("merging_station_m", now.merging_station[row]),
-                ("merging_speed_m_s", now.merging_speed[row]),
-                ("log_odds", log_odds[row]),
-                ("not_yield", log_odds[row] >= 0.0),
-            ):
-                trace[name].append(float(value))
+        cycles = 0 if self._found else int(tracks.cycles.sum())
+        self._effort.encounter_cycles += cycles
+        self._effort.vehicle_steps += 2 * cycles

@@ -28,10 +28,11 @@ from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.rows import free_time
 from merge_cosim.scenarios.encounters import SourceChoice, load_encounters
 from merge_cosim.scenarios.scenario import Scenario, load_scenario
-from merge_cosim.scoring.scoring import GOAL, Rules
+from merge_cosim.scoring.rules import Rules
+from merge_cosim.scoring.scoring import GOAL
 from merge_cosim.simulation.host_driver import HostDriver
 from merge_cosim.simulation.loop import simulate
-from merge_cosim.simulation.worlds.tiles import ClosedFormWorld
+from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 from merge_cosim.studies.minimum_delay import Ahead, Reach, earliest_pass_behind
 
 MOST_DELAY = 5.0

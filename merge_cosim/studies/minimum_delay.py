@@ -15,7 +15,7 @@ import numpy as np
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.units import DT, TOLERANCE, FloatArray
-from merge_cosim.scoring.scoring import Rules
+from merge_cosim.scoring.rules import Rules
 
 SPEED_STEP = 0.05
 """Resolution of the speed grid [m/s]: accelerations are multiples of 0.5 m/s^2."""

@@ -21,7 +21,8 @@ from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue
 from merge_cosim.sweeps.executors import Finished, interrupts_ignored
 from merge_cosim.sweeps.identity import digest, digest_of, ramp_files, software
-from merge_cosim.sweeps.task import Task, WorkerSession
+from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 LOCAL = "local"
 """Address that stands for a cluster of this machine's processes, made for the sweep."""

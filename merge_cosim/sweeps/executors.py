@@ -21,7 +21,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import load_plugin
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue
-from merge_cosim.sweeps.task import WorkerSession
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 if TYPE_CHECKING:  # a worker process plans nothing, and need not import what planning needs
     from merge_cosim.sweeps.plan import StartMethod, SweepRequest

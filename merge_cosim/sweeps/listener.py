@@ -12,18 +12,19 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import DT, TOLERANCE
 from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.merging_cars.sumo import BySumo
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.results.statistics.summary import TRAFFIC
+from merge_cosim.results.rows import result_rows
 from merge_cosim.scenarios.methods import Method
-from merge_cosim.scoring.scoring import Rules
-from merge_cosim.simulation.worlds.host_controller import HostController
+from merge_cosim.scoring.rules import Rules
+from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.meetings import DEFAULT_ATTENTION, Attention
+from merge_cosim.simulation.worlds.traffic import TRAFFIC, TrafficWorld
 from merge_cosim.sumo.attach import other_net
 from merge_cosim.sumo.listener import StepListener
 from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.tiles import tile_id
 from merge_cosim.sweeps.plan import default_model
-from merge_cosim.sweeps.scene_task import meeting_rows
 
 
 class HostListener(StepListener):  # type: ignore[misc]
@@ -33,7 +34,7 @@ class HostListener(StepListener):  # type: ignore[misc]
     and `--no-internal-links true`.
 
     Attributes:
-        controller: What drives; its `finished` meetings and its `notes` grow as the simulation goes on.
+        world: What is driven; its `kept` meetings and its `notes` grow as the simulation goes on.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class HostListener(StepListener):  # type: ignore[misc]
         rules: Rules | None = None,
         seed: int = 0,
     ) -> None:
-        """Take the wheel in a simulation that has been started.
+        """Drive the hosts of a simulation that has been started.
 
         Args:
             api: The module libsumo or traci, or a connection of traci.
@@ -58,10 +59,10 @@ class HostListener(StepListener):  # type: ignore[misc]
             method: Estimator, or estimator+controller.
             model: Model file or name; None for the project's own.
             settings: Parameters by `component.parameter`, as `acc.headway`.
-            speed_limit: Speed of a host that nobody hinders [m/s]; None for the ramp's limit.
+            speed_limit: Speed of a host that nothing hinders [m/s]; None for the ramp's limit.
             host: A vehicle, flow or type that is a host without saying so.
             attention: Which merging cars a host attends to.
-            rules: How meetings are scored.
+            rules: How encounters are scored.
             seed: Seed of the methods' random streams.
 
         Raises:
@@ -81,11 +82,9 @@ class HostListener(StepListener):  # type: ignore[misc]
         copied = session.has_edge(tile_id(0, self._ramp.main_route[0]))
         if not copied and (amiss := other_net(session, self._ramp.net, edges)):
             raise UserError(f"HostListener: {amiss}")
-        self._time = session.time()
+        self.world = TrafficWorld(session, self._ramp, host=host, attention=attention)
         driver = self._method.driver(self._model)
-        self.controller = HostController(
-            session, self._ramp, driver, self._setting, attention, self._rules.horizon, seed, host
-        )
+        self._loop = Loop(self.world, None, driver, BySumo(), self._rules, self._setting, seed=seed)
 
     def step(self, t: float = 0) -> bool:
         """Observe, estimate and command; called by `simulationStep()`.
@@ -93,19 +92,17 @@ class HostListener(StepListener):  # type: ignore[misc]
         Raises:
             UserError: SUMO was asked for several steps at once.
         """
-        time = self._session.time()
-        if time > self._time + DT + TOLERANCE:
+        if self._session.time() > self.world.time + DT + TOLERANCE:
             raise UserError("HostListener: several steps at once; call simulationStep() without a time")
-        self._time = time
-        self.controller.cycle()
+        self.world.read()
+        self._loop.after_step()
+        self._loop.before_step()
         return True
 
     def results(self) -> pd.DataFrame:
-        """End all open meetings and return one row per meeting, as in `results.parquet`; before SUMO is closed."""
-        self.controller.close()
+        """End all open encounters and return one row per encounter, as in `results.parquet`; before SUMO is closed."""
+        run = self._loop.finish()
+        self.world.note_absent()
         names = {"scenario": "", "variation": "", "method": self._method.name}
         names["model"] = self._model.name if self._model else ""
-        rows = meeting_rows(
-            self.controller.finished, "000", self._ramp, self._rules, self._setting, self._rules.free, names
-        )
-        return rows.to_pandas()
+        return result_rows(run, run.encounters, self._setting, self._rules.free, names).to_pandas()

@@ -16,8 +16,8 @@ from merge_cosim.core.units import IntArray
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.statistics.comparison import reference_of
-from merge_cosim.results.statistics.summary import TRAFFIC
 from merge_cosim.scenarios.encounters import SourceChoice, load_encounters
+from merge_cosim.scenarios.logged_scenes import load_scenes
 from merge_cosim.scenarios.methods import (
     CONSTANT,
     ORACLE_BEST,
@@ -29,12 +29,12 @@ from merge_cosim.scenarios.methods import (
 from merge_cosim.scenarios.scenario import Scenario, load_scenario
 from merge_cosim.scenarios.settings import split_settings
 from merge_cosim.scenarios.sources import Routes, Traffic
+from merge_cosim.simulation.worlds.traffic import TRAFFIC
 from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.lane_map import LaneMap
 from merge_cosim.sumo.vehicle_types import ROLE
-from merge_cosim.sweeps.full_scene_task import SceneReplay, load_scenes
-from merge_cosim.sweeps.scene_task import SceneBatch
-from merge_cosim.sweeps.task import Batch, Task
+from merge_cosim.sweeps.cases import LoggedCases, PairCases, TrafficCases
+from merge_cosim.sweeps.task import Task
 
 StartMethod = Literal["spawn", "fork"]
 ScenarioSpec: TypeAlias = str | Scenario | tuple[Scenario, Encounters]
@@ -105,30 +105,17 @@ def plan(request: SweepRequest) -> list[Task]:
                 methods = [method for method in methods if varied in method.parameters()]
             for scenario, given in _scenarios(request.scenarios, of_scenario, varied):
                 if scenario.is_scene:
-                    tasks += _scene_batches(scenario, label, methods, request)
+                    tasks += _traffic_tasks(scenario, label, methods, request)
                     continue
                 key = scenario.encounters_key if given is None else scenario.name
                 if key not in loaded:
                     found = load_encounters(scenario, request.data, request.source) if given is None else given
                     loaded[key] = _by_name(found)
-                tasks += _encounter_batches(scenario, label, methods, loaded[key], request)
+                tasks += _encounter_tasks(scenario, label, methods, loaded[key], request)
     if not tasks:
         raise UserError("nothing to run: no method fits the scenarios")
     reference_of(method_names(request, tasks), request.against)
     return sorted(tasks, key=lambda task: (task.scenario.name, task.variation, task.method.name))
-
-
-def plan_encounters(request: SweepRequest) -> list[Batch]:
-    """The same for what needs encounters.
-
-    Raises:
-        UserError: See `plan`; or a scenario is living traffic.
-    """
-    tasks = plan(request)
-    for task in tasks:
-        if not isinstance(task, Batch):
-            raise UserError(f"scenario {task.scenario.name}: it is living traffic and has no encounters of its own")
-    return [task for task in tasks if isinstance(task, Batch)]
 
 
 def method_names(request: SweepRequest, tasks: Sequence[Task]) -> list[str]:
@@ -184,9 +171,7 @@ def _refuse_unused(settings: dict[str, Any], methods: Sequence[Method]) -> None:
             raise UserError(f"{name}: no method of this sweep has this parameter; {hint}, or add --method")
 
 
-def _scene_batches(
-    scenario: Scenario, variation: str, methods: list[Method], request: SweepRequest
-) -> Iterator[SceneBatch]:
+def _traffic_tasks(scenario: Scenario, variation: str, methods: list[Method], request: SweepRequest) -> Iterator[Task]:
     traffic = scenario.encounters
     assert isinstance(traffic, (Routes, Traffic))
     if isinstance(traffic, Routes):
@@ -197,20 +182,19 @@ def _scene_batches(
             configuration.require(traffic.host)
         elif not configuration.names_role("host"):
             raise UserError(
-                f'{traffic.file}: nobody is the host; add <param key="{ROLE}" value="host"/> to a vType, or name a '
+                f'{traffic.file}: no car is the host; add <param key="{ROLE}" value="host"/> to a vType, or name a '
                 f"vehicle or type: --set encounters.host=ID"
             )
     for method in methods:
         if method.is_human or method.needs_label:
             continue
-        yield SceneBatch(
+        yield Task(
             scenario=scenario,
+            cases=TrafficCases(traffic, 0, traffic.replications),
             variation=variation,
             method=method,
             model=_model(method, TRAFFIC, request),
             seed=request.seed,
-            first=0,
-            last=traffic.replications,
         )
 
 
@@ -224,27 +208,36 @@ def _model(method: Method, source: str, request: SweepRequest) -> IntentionModel
     return model
 
 
-def _encounter_batches(
+def _encounter_tasks(
     scenario: Scenario, variation: str, methods: list[Method], encounters: Encounters, request: SweepRequest
-) -> Iterator[Batch]:
+) -> Iterator[Task]:
     encounters, left_out = _on_the_ramp(scenario, encounters)
     for source in dict.fromkeys(encounters.source.tolist()):
         chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
-        scenes = None if scenario.full_scene is None else load_scenes(scenario, source, request.data)
+        cases = _cases(scenario, chosen, source, request.data)
         for method in methods_for(chosen, methods):
             model = _model(method, source, request)
             if model is not None:
                 _refuse_trained(scenario, chosen, model)
-            batch = Batch(
+            yield Task(
                 scenario=scenario,
+                cases=cases,
                 variation=variation,
                 method=method,
                 model=model,
-                encounters=chosen,
                 seed=request.seed,
                 left_out=left_out,
             )
-            yield batch if scenes is None else SceneReplay.of(batch, scenes)
+
+
+def _cases(scenario: Scenario, encounters: Encounters, source: str, data: Path | None) -> PairCases:
+    """The encounters alone, or among the cars that were logged with them."""
+    if scenario.full_scene is None:
+        return PairCases(encounters)
+    try:
+        return LoggedCases.of(encounters, scenario.full_scene, load_scenes(scenario, source, data))
+    except UserError as error:
+        raise UserError(f"scenario {scenario.name}: {error}") from None
 
 
 def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:

@@ -4,31 +4,23 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.registry import did_you_mean
-from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.ramps.view import view_options
-from merge_cosim.simulation.worlds.logged import LoggedWorld
-from merge_cosim.simulation.worlds.tiles import TiledWorld
-from merge_cosim.sumo.attach import Address, AttachedSession
-from merge_cosim.sumo.options import SumoOptions, delay_option
+from merge_cosim.scenarios.sources import Traffic
+from merge_cosim.simulation.loop import Everything
+from merge_cosim.sumo.attach import Address
+from merge_cosim.sumo.demand import write_traffic
 from merge_cosim.sumo.outputs import SumoOutputs
 from merge_cosim.sumo.routes import write_encounter
-from merge_cosim.sumo.session import Session
-from merge_cosim.sumo.start import TraciSession, connection_kept
-from merge_cosim.sumo.tiles import tile_id
-from merge_cosim.sweeps.full_scene_task import SceneReplay
-from merge_cosim.sweeps.plan import SweepRequest, plan, plan_encounters
-from merge_cosim.sweeps.scene_task import SceneBatch
-from merge_cosim.sweeps.single_scene import export_scene, run_scene_alone
-from merge_cosim.sweeps.task import Batch
+from merge_cosim.sumo.start import connection_kept
+from merge_cosim.sweeps.cases import RunOptions, TrafficCases
+from merge_cosim.sweeps.plan import SweepRequest, plan
+from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 NO_OUTPUTS = SumoOutputs()
 
@@ -41,7 +33,7 @@ def run_single(
     outputs: SumoOutputs = NO_OUTPUTS,
     attach: Address | None = None,
 ) -> dict[str, Any]:
-    """Run one case of one scenario under one method.
+    """Run one case of one scenario under one method; see `trace_case`.
 
     Args:
         request: Names one scenario and one method.
@@ -49,28 +41,18 @@ def run_single(
         gui_delay: Milliseconds per step in sumo-gui; None runs without a window.
         trace: File for the cycle-by-cycle record (.csv or .parquet), or None.
         outputs: Files that SUMO is to write.
-        attach: Drive in the SUMO that listens there, instead of one of our own.
+        attach: Drive in the SUMO that listens there, instead of a new one.
 
     Returns:
-        The result row.
+        The result row; of a scene of living traffic its facts.
 
     Raises:
-        UserError: There is no such case, the trace's file name has another ending, or the method is the log itself
-            and a window, SUMO's outputs or a running SUMO are asked for; or SUMO is not as it must be.
+        UserError: There is no such case, or the trace's file name has another ending.
         OSError: A file cannot be written.
     """
     if trace is not None and trace.suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: --trace writes .csv or .parquet")
-    task = plan(request)[0]
-    for name, given in (("--gui", gui_delay is not None), ("SUMO's outputs", outputs.wanted)):
-        if attach is not None and given:
-            raise UserError(f"{name}: not with --attach; whoever starts SUMO chooses the window and the outputs")
-    if gui_delay is not None:
-        _need_display()
-    if isinstance(task, SceneBatch):
-        row, record = run_scene_alone(task, case, gui_delay, outputs, attach)
-    else:
-        row, record = trace_case(_case_alone(plan_encounters(request), case), gui_delay, outputs, attach)
+    row, record = trace_case(case_alone(plan(request), case), case, gui_delay, outputs, attach)
     if trace is not None:
         trace.parent.mkdir(parents=True, exist_ok=True)
         if trace.suffix == ".csv":
@@ -81,41 +63,58 @@ def run_single(
 
 
 def trace_case(
-    batch: Batch, gui_delay: int | None = None, outputs: SumoOutputs = NO_OUTPUTS, attach: Address | None = None
+    task: Task,
+    case: str,
+    gui_delay: int | None = None,
+    outputs: SumoOutputs = NO_OUTPUTS,
+    attach: Address | None = None,
 ) -> tuple[dict[str, Any], pd.DataFrame]:
-    """Run a batch of one and return its result row and its record, one row per cycle."""
-    ramp = Ramp.load(batch.scenario.ramp)
-    asked = {"--gui": gui_delay is not None, "SUMO's outputs": outputs.wanted, "--attach": attach is not None}
-    wanted = [name for name, given in asked.items() if given]
-    if wanted and batch.method.is_human:
-        raise UserError(
-            f"{wanted[0]}: the method 'human' is the log itself and is not driven in SUMO; leave one of them out"
-        )
-    world = _open_world(batch, ramp, gui_delay, outputs.prepare(), attach)
+    """Run a task of one case and return its result row and its record, one row per cycle.
+
+    A case of living traffic is a scene, whose facts stand for the row, or an encounter in it (`SCENE/HOST/MERGING`).
+
+    Raises:
+        UserError: There is no such encounter; or the method is the log itself and a window, SUMO's outputs or a running
+            SUMO are asked for; or SUMO is not as it must be.
+    """
+    asked = {"--gui": gui_delay is not None, "SUMO's outputs": outputs.wanted}
+    for name in (name for name, given in asked.items() if given and attach is not None):
+        raise UserError(f"{name}: not with --attach; the user who starts SUMO chooses the window and the outputs")
+    for name in (name for name, given in (asked | {"--attach": attach is not None}).items() if given):
+        if task.method.is_human:
+            raise UserError(f"{name}: the method 'human' is the log itself and is not driven in SUMO; leave one out")
+    if gui_delay is not None and "DISPLAY" not in os.environ and sys.platform.startswith("linux"):
+        raise UserError("--gui: there is no display (DISPLAY is not set); leave it out, or use xvfb-run")
+    options, session = RunOptions(gui_delay, outputs.prepare(), attach), WorkerSession(tiles=1)
     try:
         with connection_kept():
-            run = batch.simulate(world, ramp, traced=(0,))
+            ((run, facts),) = task.runs(session, options, traced=Everything())
     finally:
-        world.close()
-    return batch.rows(run, ramp).to_pylist()[0], pd.DataFrame(run.traces[0])
+        session.close()
+    rows = {row["case"]: row for row in task.rows(run).to_pylist()}
+    if case in rows:
+        return rows[case], run.traces[case].assign(case=case)
+    if "/" in case:
+        few = f" (such as {', '.join(list(rows)[:3])})" if rows else ""
+        raise UserError(f"scenario {task.scenario.name}: no encounter '{case}' is scored under {task.method.name}{few}")
+    records = [trace.assign(case=name) for name, trace in run.traces.items()]
+    return {**task.names, **facts[0]}, pd.concat(records or [pd.DataFrame()], ignore_index=True)
 
 
-def _open_world(
-    batch: Batch, ramp: Ramp, gui_delay: int | None, extra: tuple[str, ...], attach: Address | None
-) -> TiledWorld | LoggedWorld:
-    """SUMO for a batch of one."""
-    if isinstance(batch, SceneReplay):
-        if attach is not None:
-            raise UserError("--attach: not with full_scene, which starts SUMO with a recording's cars; leave it out")
-        return batch.open(ramp, gui_delay, extra)
-    if attach is not None:
-        return TiledWorld(ramp, 1, batch.seed, lambda options: AttachedSession(options, attach), tiled=False)
-    if gui_delay is None:
-        return TiledWorld(ramp, 1, batch.seed, extra=extra)
-    shown = (*view_options(ramp.net.parent), *delay_option(gui_delay))
-    world = TiledWorld(ramp, 1, batch.seed, _open_window, (*shown, *extra))
-    world.session.follow(tile_id(0, "host"))
-    return world
+def case_alone(tasks: list[Task], case: str) -> Task:
+    """The task of one case alone.
+
+    Raises:
+        UserError: No task has such a case.
+    """
+    for task in tasks:
+        try:
+            number = task.cases.find(case)
+        except UserError as error:
+            refused = error
+            continue
+        return task.part(number, number + 1)
+    raise UserError(f"scenario {tasks[0].scenario.name}: {refused}")
 
 
 def trace_methods(request: SweepRequest, case: str) -> tuple[pd.DataFrame, dict[str, bool]]:
@@ -128,20 +127,34 @@ def trace_methods(request: SweepRequest, case: str) -> tuple[pd.DataFrame, dict[
         UserError: There is no such case.
     """
     records, failed = [], {}
-    for batch in plan_encounters(request):
-        row, record = trace_case(_case_alone([batch], case))
-        records.append(record.assign(method=batch.method.name))
-        failed[batch.method.name] = bool(row["failed"])
+    for task in plan(request):
+        row, record = trace_case(case_alone([task], case), case)
+        records.append(record.assign(method=task.method.name))
+        failed[task.method.name] = bool(row["failed"])
     return pd.concat(records, ignore_index=True), failed
 
 
 def export_case(request: SweepRequest, case: str, out: Path) -> Path:
-    """Write one case of one scenario as SUMO files into a folder; returns the `.sumocfg`."""
-    task = plan(request)[0]
-    if isinstance(task, SceneBatch):
-        return export_scene(task, out)
-    batch = _case_alone(plan_encounters(request), case)
-    return write_encounter(out, Ramp.load(batch.scenario.ramp), batch.encounters, 0)
+    """Write one case of one scenario as SUMO files into a folder; returns the `.sumocfg`.
+
+    The scenes of living traffic differ by SUMO's seed alone.
+
+    Raises:
+        UserError: There is no such case, it is a SUMO configuration already, or its traffic drives on several copies of
+            the ramp.
+    """
+    tasks = plan(request)
+    task = tasks[0]
+    if not isinstance(task.cases, TrafficCases):
+        task = case_alone(tasks, case)
+        assert task.cases.encounters is not None
+        return write_encounter(out, task.ramp, task.cases.encounters, 0)
+    traffic = task.cases.traffic
+    if not isinstance(traffic, Traffic):
+        raise UserError(f"{traffic.file}: this is a SUMO configuration already")
+    if traffic.demand.copies > 1:
+        raise UserError("export: the files of one ramp are written; leave out encounters.demand.copies")
+    return write_traffic(out, traffic.demand, task.ramp)
 
 
 def export_commonroad(request: SweepRequest, case: str, out: Path) -> Path:
@@ -153,32 +166,14 @@ def export_commonroad(request: SweepRequest, case: str, out: Path) -> Path:
     from merge_cosim.ramps.export.commonroad import need_library, write_commonroad
 
     need_library()
-    if isinstance(task := plan(request)[0], SceneBatch):
-        raise UserError(f"scenario {task.scenario.name}: --commonroad writes encounters of two cars, not scenes")
-    every = plan_encounters(request)
-    batch = _case_alone(every, case)
-    number = 1 + int(np.flatnonzero(every[0].encounters.case == case)[0])
-    ramp = Ramp.load(batch.scenario.ramp)
-    _, record = trace_case(batch)
-    source = batch.encounters.source[0]
-    story = f"scenario {batch.scenario.name} (source {source}), case {case}, host driven by {batch.method.name}"
-    return write_commonroad(out, ramp, batch.encounters, record, number, story)
-
-
-def _need_display() -> None:
-    if "DISPLAY" not in os.environ and sys.platform.startswith("linux"):
-        raise UserError("--gui: there is no display (DISPLAY is not set); leave it out, or use xvfb-run")
-
-
-def _open_window(options: SumoOptions) -> Session:
-    return TraciSession(options, gui=True)
-
-
-def _case_alone(batches: Sequence[Batch], case: str) -> Batch:
-    for batch in batches:
-        found = np.flatnonzero(batch.encounters.case == case)
-        if len(found):
-            return batch.part(int(found[0]), int(found[0]) + 1)
-    names = [str(name) for batch in batches for name in batch.encounters.case]
-    few = did_you_mean(case, names) if len(names) <= 12 else f" (such as {names[0]}, {names[-1]})"
-    raise UserError(f"scenario {batches[0].scenario.name}: no case '{case}'{few}")
+    tasks = plan(request)
+    if tasks[0].cases.encounters is None:
+        raise UserError(f"scenario {tasks[0].scenario.name}: --commonroad writes encounters of two cars, not scenes")
+    task = case_alone(tasks, case)
+    number = 1 + tasks[0].cases.find(case)
+    encounters = task.cases.encounters
+    assert encounters is not None
+    _, record = trace_case(task, case)
+    source = encounters.source[0]
+    story = f"scenario {task.scenario.name} (source {source}), case {case}, host driven by {task.method.name}"
+    return write_commonroad(out, task.ramp, encounters, record, number, story)

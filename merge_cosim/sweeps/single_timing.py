@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.store import ResultFolder
 from merge_cosim.simulation.loop import Effort
-from merge_cosim.sweeps.task import Batch, Task, WorkerSession
+from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 SINGLE_CASES = 5
 """Cases run one at a time to time a method's update in a batch of one."""
@@ -21,9 +21,9 @@ _NO_RECORDS = pd.DataFrame({name: pd.Series(dtype=str) for name in ("scenario", 
 
 
 def time_single_cases(tasks: Sequence[Task], results: ResultFolder) -> tuple[dict[str, float], pa.Table]:
-    """Run a few cases of each scenario and method one at a time, the most illustrative one first and recorded.
+    """Run a few cases of each scenario and method one at a time, the illustrative one first and recorded.
 
-    Scenes are left out: their cases cannot be run alone.
+    Living traffic is left out: its encounters cannot be run alone.
 
     Returns:
         Time of one update in a batch of one [us] by method, and the records of the illustrative cases.
@@ -32,21 +32,19 @@ def time_single_cases(tasks: Sequence[Task], results: ResultFolder) -> tuple[dic
     efforts: dict[str, Effort] = {}
     records = [_NO_RECORDS]
     worker_session = WorkerSession(tiles=1)
-    for batch in tasks:
-        if batch.variation or not isinstance(batch, Batch):
+    for task in tasks:
+        if task.variation or task.cases.encounters is None:
             continue
-        scenario = batch.scenario.name
+        scenario = task.scenario.name
         if scenario not in illustrative:
             illustrative[scenario] = _illustrative_case(
                 results.rows_of(scenario, "", ["case", "failed", "distance_m"]).to_pandas()
             )
-        order = np.argsort(batch.encounters.case != illustrative[scenario], kind="stable")[:SINGLE_CASES]
-        few = batch.take(order)
-        ramp = Ramp.load(batch.scenario.ramp)
-        run = few.simulate(few.world(worker_session, ramp), ramp, traced=(0,))
-        efforts.setdefault(batch.method.name, Effort()).add(run.effort)
-        names = {"scenario": scenario, "case": str(few.encounters.case[0]), "method": batch.method.name}
-        records.append(pd.DataFrame(run.traces[0]).assign(**names))
+        order = np.argsort(task.cases.encounters.case != illustrative[scenario], kind="stable")[:SINGLE_CASES]
+        name = str(task.cases.encounters.case[order[0]])
+        for run, _ in task.take(order).runs(worker_session, traced={name}):
+            efforts.setdefault(task.method.name, Effort()).add(run.effort)
+            records.append(run.traces[name].assign(scenario=scenario, case=name, method=task.method.name))
     worker_session.close()
     times = {name: 1e6 * e.method_s / e.encounter_cycles for name, e in efforts.items() if e.encounter_cycles}
     return times, pa.Table.from_pandas(pd.concat(records), preserve_index=False)

@@ -1,88 +1,61 @@
-"""One batch of a sweep, as a worker process runs it."""
+"""A task of a sweep: cases of one scenario under one method, as a worker process runs them."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import pyarrow as pa
 
-from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.rows import result_rows
-from merge_cosim.results.schema import CLOSED_FORM, SUMO
+from merge_cosim.results.store import with_scene_facts
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import Scenario
-from merge_cosim.scoring.scoring import expected_cycles
-from merge_cosim.simulation.host_driver import HostDriver
 from merge_cosim.simulation.loop import Effort, Run, simulate
-from merge_cosim.simulation.worlds.logged import LoggedWorld
-from merge_cosim.simulation.worlds.tiles import TiledWorld, World
-from merge_cosim.sweeps.human import simulate_human
-
-TILES = 192
-"""Encounters side by side in one SUMO. From 128 to 208 tiles a case costs the same: more of them spread the cost of a
-cycle's Python over more cars, but SUMO's own step costs more per car, as more cars fit its cache less well."""
-
-CHUNK_CASES = 1_000
-"""Most encounters that are handed out at a time: enough to keep the tiles busy, few enough to lose little when
-interrupted."""
+from merge_cosim.simulation.worlds.base import World
+from merge_cosim.simulation.worlds.logged_host import Undecided
+from merge_cosim.sweeps.cases import AS_IN_A_SWEEP, Cases, Facts, RunOptions
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task(ABC):
-    """Something of one scenario that is run under one method: `len` cases, which can be parted.
+class Task:
+    """Cases of one scenario that are run under one method; they can be parted.
 
     Attributes:
         scenario: The scenario, variation applied.
+        cases: What is run.
         variation: What was varied, such as `acc.headway=1.0`; empty for the scenario as it is.
         method: The method.
         model: Its learned model, if it needs one.
         seed: SUMO's seed.
         left_out: Names of cases of the scenario that do not fit on its ramp.
-        most: Most cases that are handed out at a time.
     """
 
     scenario: Scenario
+    cases: Cases
     variation: str = ""
     method: Method
     model: IntentionModel | None = None
     seed: int = 0
     left_out: tuple[str, ...] = ()
-    most: int
 
-    @abstractmethod
     def __len__(self) -> int:
-        """How many cases."""
+        return len(self.cases)
 
-    @abstractmethod
-    def case(self, number: int) -> str:
-        """Name of a case."""
-
-    @abstractmethod
-    def part(self, first: int, last: int) -> Self:
-        """The cases `first` to `last - 1` as a task of their own."""
-
-    @abstractmethod
-    def cycles(self) -> FloatArray:
-        """Expected cycles of each case, shape (len(self),)."""
-
-    @abstractmethod
-    def digest(self) -> str:
-        """A short hash of what its cases hold."""
-
-    @abstractmethod
-    def run(self, worker_session: WorkerSession) -> tuple[pa.Table, Effort]:
-        """Simulate the cases and return their result rows and what they cost."""
+    @property
+    def most(self) -> int:
+        """Most cases that are handed out at a time."""
+        return self.cases.most
 
     @property
     def names(self) -> dict[str, str]:
-        """What all rows of the batch have in common."""
+        """What all rows have in common."""
         return {
             "scenario": self.scenario.name,
             "variation": self.variation,
@@ -90,102 +63,73 @@ class Task(ABC):
             "model": self.model.name if self.model else "",
         }
 
-    def setting(self, ramp: Ramp) -> Setting:
+    @property
+    def setting(self) -> Setting:
         """Speed limit and cycle."""
-        return Setting(speed_limit=self.scenario.speed_limit or ramp.speed_limit)
+        return Setting(speed_limit=self.scenario.speed_limit or self.ramp.speed_limit)
 
-
-@dataclass(frozen=True, kw_only=True)
-class Batch(Task):
-    """Some encounters of one scenario under one method.
-
-    Attributes:
-        encounters: The cases.
-    """
-
-    encounters: Encounters
-    most: int = CHUNK_CASES
-
-    def __len__(self) -> int:
-        return len(self.encounters)
+    @property
+    def ramp(self) -> Ramp:
+        """The ramp."""
+        return Ramp.load(self.scenario.ramp)
 
     def case(self, number: int) -> str:
         """Name of a case."""
-        return str(self.encounters.case[number])
+        return self.cases.name(number)
+
+    def cycles(self) -> FloatArray:
+        """Expected cycles of each case, shape (len(self),)."""
+        return self.cases.cycles(self.scenario.test)
+
+    def digest(self) -> str:
+        """A short hash of what its cases hold."""
+        return self.cases.digest(self.ramp)
 
     def part(self, first: int, last: int) -> Self:
         """The cases `first` to `last - 1`, made only when asked for, so that a million cases are not held twice."""
-        return replace(self, encounters=self.encounters.part(first, last), left_out=())
+        return replace(self, cases=self.cases.part(first, last), left_out=())
 
     def take(self, rows: IntArray) -> Self:
         """The chosen cases, in that order."""
-        return replace(self, encounters=self.encounters.take(rows))
-
-    def cycles(self) -> FloatArray:
-        """Expected cycles of each case; see `expected_cycles`."""
-        return expected_cycles(self.encounters, self.scenario.test)
-
-    def digest(self) -> str:
-        """A short hash of the encounters."""
-        return self.encounters.digest
+        return replace(self, cases=self.cases.take(rows))
 
     def run(self, worker_session: WorkerSession) -> tuple[pa.Table, Effort]:
-        """Simulate the cases on tiles."""
-        ramp = Ramp.load(self.scenario.ramp)
-        run = self.simulate(self.world(worker_session, ramp), ramp)
-        return self.rows(run, ramp), run.effort
+        """Simulate the cases; returns their result rows and what they cost."""
+        effort, tables, facts = Effort(), [], []
+        for run, found in self.runs(worker_session):
+            effort.add(run.effort)
+            tables.append(self.rows(run))
+            facts += [{**self.names, **fact} for fact in found]
+        return with_scene_facts(pa.concat_tables(tables), facts), effort
 
-    def world(self, worker_session: WorkerSession, ramp: Ramp) -> World:
-        """What moves the cars."""
-        return worker_session.world(ramp, len(self), self.seed)
+    def runs(
+        self, worker_session: WorkerSession, options: RunOptions = AS_IN_A_SWEEP, traced: Container[str] = ()
+    ) -> Iterator[tuple[Run, Facts]]:
+        """Simulate the cases, in as many runs as they need; facts of scenes beside each."""
+        worlds = self.cases.worlds(self.ramp, self.seed, worker_session, options, self.method.is_human)
+        for opening in worlds:
+            with opening as (world, seed, facts):
+                run = self.simulate(world, seed, traced)
+                found = facts(run)
+            yield run, found
 
-    def driver(self, world: World) -> HostDriver:
-        """The method, as it drives in a world."""
-        return self.method.driver(self.model)
+    def simulate(self, world: World, seed: int = 0, traced: Container[str] = ()) -> Run:
+        """Simulate the cases in a world, with the given seed of the encounters' random streams."""
+        scenario = self.scenario
+        driver = Undecided() if self.method.is_human else self.method.driver(self.model)
+        run = simulate(
+            world,
+            self.cases.encounters,
+            driver,
+            scenario.merging_car(),
+            scenario.test,
+            self.setting,
+            traced,
+            seed,
+        )
+        # The row `human` is made from the log: neither SUMO nor a method was at work.
+        return replace(run, effort=Effort()) if self.method.is_human else run
 
-    def simulate(self, world: World, ramp: Ramp, traced: Sequence[int] = ()) -> Run:
-        """Simulate the cases on a given world; the human host needs none."""
-        rules, setting, car = self.scenario.test, self.setting(ramp), self.scenario.merging_car()
-        if self.method.is_human:
-            return simulate_human(self.encounters, car, rules, setting, tuple(traced))
-        driver = self.driver(world)
-        return self.finished(world, simulate(world, self.encounters, driver, car, rules, setting, traced, self.seed))
-
-    def finished(self, world: World, run: Run) -> Run:
-        """The run with what the world alone knows of it."""
-        return run
-
-    def rows(self, run: Run, ramp: Ramp) -> pa.Table:
+    def rows(self, run: Run) -> pa.Table:
         """The result rows of a run."""
-        world = CLOSED_FORM if self.method.is_human else SUMO
-        return result_rows(run, self.encounters, self.setting(ramp), self.scenario.test.free, self.names, world=world)
-
-
-class WorkerSession:
-    """Keeps one SUMO open from batch to batch, as long as ramp and seed stay the same."""
-
-    def __init__(self, tiles: int = TILES) -> None:
-        self._tiles = tiles
-        self._open: tuple[str, int, int] | None = None
-        self._world: TiledWorld | LoggedWorld | None = None
-
-    def world(self, ramp: Ramp, cases: int, seed: int) -> TiledWorld:
-        """A world on this ramp, with no more tiles than there are cases."""
-        tiles = min(self._tiles, cases)
-        wanted = (str(ramp.net), tiles, seed)
-        if not isinstance(self._world, TiledWorld) or self._open != wanted:
-            self.close()
-            self._world, self._open = TiledWorld(ramp, tiles, seed), wanted
-        return self._world
-
-    def hold(self, world: LoggedWorld) -> LoggedWorld:
-        """End the simulation that is open, and keep another world in its place."""
-        self.close()
-        self._world = world
-        return world
-
-    def close(self) -> None:
-        """End the simulation."""
-        if self._world is not None:
-            self._world.close()
-            self._world = None
+        return result_rows(run, run.encounters, self.setting, self.scenario.test.free, self.names)

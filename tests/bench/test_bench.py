@@ -9,6 +9,7 @@ from merge_cosim.bench import loops
 from merge_cosim.bench.updates import estimator_costs
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.base import estimators
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 
 @pytest.mark.slow
@@ -63,12 +64,10 @@ def test_outcomes_are_compared_case_by_case(monkeypatch):
 
 
 def test_the_sample_holds_failures(tmp_path):
-    batch = loops._batch(400)
-    from merge_cosim.sweeps.task import WorkerSession
-
+    task = loops._task(400)
     worker_session = WorkerSession()
     try:
-        rows, _ = batch.run(worker_session)
+        rows, _ = task.run(worker_session)
     finally:
         worker_session.close()
     assert 0 < sum(rows["failed"].to_pylist()) < len(rows)

@@ -33,7 +33,7 @@ def test_the_outcome_is_that_of_our_own_sumo(tmp_path):
 
 
 def test_it_is_the_same_beside_other_traffic_and_in_an_auxiliary_lane(tmp_path):
-    name = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].encounters.case[0]
+    name = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].case(0)
     case = ("run", "us101-replay", "--source", "surrogate", "--case", name, "--method", "acc", "--json")
     (tmp_path / "other.rou.xml").write_text(TRAFFIC)
     with Running("us101", "-r", tmp_path / "other.rou.xml", "--fcd-output", tmp_path / "fcd.xml") as address:

@@ -111,14 +111,14 @@ def test_one_scene_and_one_meeting_alone(minute):
     }
     trace = pd.read_csv(folder / "one.csv")
     assert set(trace["case"]) == {case["case"]}
-    assert trace["leader_gap"].min() == pytest.approx(case["min_leader_gap_m"]) or case["min_leader_gap_m"] is None
+    assert trace["leader_gap_m"].min() == pytest.approx(case["min_leader_gap_m"]) or case["min_leader_gap_m"] is None
     scene = json.loads(merge_cosim(*how, "001", "--fcd", "f.xml", cwd=folder).stdout)
     stored = next(one for one in table(out / "scenes.csv") if (one["method"], one["scene"]) == ("acc", "001"))
     assert {name: str(scene[name]) for name in ("meetings", "throughput_veh_h", "two_hosts")} == {
         name: stored[name] for name in ("meetings", "throughput_veh_h", "two_hosts")
     }
     assert "host.0" in (folder / "f.xml").read_text()
-    for wrong, expected in (("9", "no scene '9'"), ("001/host.0/x", "no meeting '001/host.0/x' is scored under acc")):
+    for wrong, expected in (("9", "no case '9'"), ("001/host.0/x", "no encounter '001/host.0/x' is scored under acc")):
         done = merge_cosim(*how, wrong, cwd=folder)
         assert (done.returncode, done.stdout) == (2, "")
         assert expected in done.stderr
@@ -160,7 +160,7 @@ def test_a_host_can_be_named_in_other_peoples_files(tmp_path):
     own_files(tmp_path, ROUTES.replace('<param key="merge-cosim.role" value="host"/>', ""))
     done = merge_cosim("sweep", "my.sumocfg", "--method", "acc", cwd=tmp_path)
     assert done.returncode == 2
-    assert "my.sumocfg: nobody is the host; add <param" in done.stderr
+    assert "my.sumocfg: no car is the host; add <param" in done.stderr
     out, _ = swept(tmp_path, "my.sumocfg", "--method", "acc", "--set", "encounters.host=host")
     assert len(rows(out)) > 0
 

@@ -17,10 +17,10 @@ from merge_cosim.scenarios.encounters import load_encounters
 from merge_cosim.scenarios.hidden import hidden_encounters
 from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.scenarios.sources import ByArrival
-from merge_cosim.scoring.scoring import Rules
+from merge_cosim.scoring.rules import Rules
 from merge_cosim.simulation.host_driver import HostDriver
 from merge_cosim.simulation.loop import simulate
-from merge_cosim.simulation.worlds.tiles import ClosedFormWorld
+from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 
 YIELD, NOT_YIELD = int(Intention.YIELD), int(Intention.NOT_YIELD)
 

@@ -65,9 +65,10 @@ def row(case=None, **changed):
         "end_merging_speed": 10.0,
         "scored_to_end": True,
     } | changed
-    run = Run({name: np.array([value]) for name, value in columns.items()}, Effort())
+    case = case or encounters()
+    run = Run(case, {name: np.array([value]) for name, value in columns.items()}, Effort(), "sumo")
     names = {"scenario": "s", "variation": "", "method": "m", "model": ""}
-    return result_rows(run, case or encounters(), SETTING, Acc(), names).to_pylist()[0]
+    return result_rows(run, case, SETTING, Acc(), names).to_pylist()[0]
 
 
 def test_free_time_at_the_limit_is_way_over_speed():

@@ -10,10 +10,11 @@ from merge_cosim.core.observation import Setting
 from merge_cosim.estimators.base import estimators
 from merge_cosim.merging_cars.base import merging_cars
 from merge_cosim.results.rows import post_encroachment
-from merge_cosim.scoring.scoring import KINDS, Rules
+from merge_cosim.scoring.rules import Rules
+from merge_cosim.scoring.scoring import KINDS
 from merge_cosim.simulation.host_driver import HostDriver
 from merge_cosim.simulation.loop import simulate
-from merge_cosim.simulation.worlds.tiles import ClosedFormWorld
+from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 
 
 def outcome(seed, method):

@@ -3,22 +3,12 @@
 import numpy as np
 import pytest
 from cases import random_encounters
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from merge_cosim.core.encounter import NEVER, Ragged, ReplayLog
 from merge_cosim.core.observation import Observation
-from merge_cosim.scoring.scoring import (
-    HOST_INTO_MERGING,
-    MERGING_INTO_HOST,
-    SIDE,
-    Rules,
-    Watch,
-    ends,
-    expected_cycles,
-    score,
-)
-from merge_cosim.scoring.tracks import Recorder, Tracks
+from merge_cosim.scoring.rules import Rules, Watch, expected_cycles
+from merge_cosim.scoring.scoring import HOST_INTO_MERGING, MERGING_INTO_HOST, SIDE, score
+from merge_cosim.scoring.tracks import Tracks
 
 DEFAULTS = Rules()
 
@@ -218,46 +208,10 @@ def test_encounters_are_scored_alike_alone_and_together():
             np.testing.assert_array_equal(values, together[name][number : number + 1], err_msg=name)
 
 
-@settings(max_examples=100)
-@given(st.integers(0, 10_000), st.sampled_from(["both", "lane_change"]))
-def test_the_end_is_the_same_while_it_runs_and_afterwards(seed, overlap_from):
-    rng = np.random.default_rng(seed)
-    rules = Rules(horizon=1.0, time_out=4.0, overlap_from=overlap_from)
-    host, merging = (np.cumsum(rng.uniform(0, 3, 60)) - rng.uniform(0, 90) for _ in range(2))
-    tracks = laid(host, merging)
-    assert ends(tracks, rules)[0] == watched(tracks, rules)
-    short = laid(host[:9], merging[:9])
-    assert ends(short, rules)[0] == (watched(short, rules) or 8)
-
-
-def test_what_was_recorded_after_the_end_does_not_count():
-    tracks = laid(line(-5, 10), line(-8, 10))
-    ended = tracks.until(ends(tracks, Rules()))
-    assert ended.cycles.tolist() == [8]
-    for name, values in score(laid(line(-5, 10, 9), line(-8, 10, 9)), Rules()).items():
-        np.testing.assert_array_equal(score(ended, Rules())[name], values, err_msg=name)
-
-
-def test_the_recorder_gives_back_what_went_through_it():
-    recorder, encounters = Recorder(3, longest=4), random_encounters(5, seed=7)
-    recorder.placed(np.arange(3), encounters.start[:, :3])
-    history = [encounters.start[:4, :3].round(6)]
-    assert (history[0] != encounters.start[:4, :3]).any()
-    np.testing.assert_array_equal(recorder.seen.host_station, history[0][0])
-    np.testing.assert_array_equal(recorder.seen.merging_speed, history[0][3])
-    for cycle in range(1, 8):  # more cycles than it holds
-        recorder.believed(np.full(3, cycle - 1.0))
-        history.append((history[-1] + 1.0).round(6))
-        recorder.moved(history[-1] + 1e-9)
-    np.testing.assert_array_equal(recorder.track(1, 4)[:4], np.array(history)[-5:, :, 1].T)
-    np.testing.assert_array_equal(recorder.track(1, 4)[4, :-1], [3.0, 4.0, 5.0, 6.0])
-    before = recorder.track(0, 2)
-    recorder.placed(np.array([1]), encounters.start[:, 4:])
-    np.testing.assert_array_equal(recorder.track(0, 2), before)  # the neighbours are left alone
-    assert recorder.seen.host_station[1] == encounters.host_station[4].round(6)
-    assert recorder.seen.host_length[1] == encounters.host_length[4]
-    with pytest.raises(ValueError, match="read-only"):
-        recorder.seen.host_station[0] = 0.0  # an estimator cannot change what was seen
+def test_the_horizon_counts_from_the_scored_cycle_and_a_failure_ends_at_once():
+    assert watched(laid(line(-5, 10), line(-30, 10)), Rules(horizon=1.0)) == 40  # both past 0 at cycle 30
+    assert watched(laid(line(-5, 10), line(-30, 10)), Rules(horizon=1.0, time_out=3.5)) == 35
+    assert watched(laid(line(-5, 10), line(-8, 10)), Rules(horizon=1.0)) == 8
 
 
 def test_longer_approaches_are_expected_to_last_longer():
@@ -273,5 +227,4 @@ def test_longer_approaches_are_expected_to_last_longer():
 def test_nothing_to_score_gives_no_rows():
     encounters = random_encounters(3, seed=9)
     tracks = Tracks.of(encounters, [], [])
-    assert ends(tracks, Rules()).shape == (0,)
     assert all(values.shape == (0,) for values in score(tracks, Rules()).values())

@@ -1,4 +1,4 @@
-"""A driver takes no nonsense from its parts."""
+"""A method ready to drive: what its parts give is checked, and its batch can grow."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.estimators.base import Estimator
 from merge_cosim.estimators.references import AlwaysGo
-from merge_cosim.simulation.host_driver import HostDriver
+from merge_cosim.simulation.host_driver import DriverBlocks, HostDriver
 
 SEEN = Observation(*np.array([[-80.0, -60.0], [25.0, 24.0], [-70.0, -90.0], [20.0, 21.0], [5.0, 5.0], [4.0, 4.0]]))
 
@@ -65,3 +65,35 @@ def test_what_is_no_number_for_each_is_refused(values, amiss):
         decided(Belief(values=values), Acc())
     with pytest.raises(UserError, match=f"Command: {amiss}"):
         decided(AlwaysGo(), Command(values=values))
+
+
+@dataclass(kw_only=True)
+class Counting(Estimator):
+    """Returns how many cycles a slot has seen since its reset, and keeps the streams that it was given."""
+
+    def start(self, count, setting):
+        self.age, self.keys = np.zeros(count), []
+
+    def reset(self, rows, labels, keys):
+        self.age[rows] = 0
+        self.keys += keys.tolist()
+
+    def update(self, seen):
+        self.age += 1
+        return self.age.copy()
+
+
+def test_blocks_are_added_while_others_go_on():
+    blocks = DriverBlocks(HostDriver(Counting(), Acc()), 2, Setting())
+    blocks.make_room(2)
+    blocks.reset(np.arange(2), np.zeros(2, dtype=int), np.array([7, 8], dtype=np.uint64))
+    assert blocks.decide(SEEN, np.ones(2, dtype=bool))[0].tolist() == [1.0, 1.0]
+    blocks.make_room(4)
+    blocks.reset(np.array([1, 2]), np.zeros(2, dtype=int), np.array([9, 10], dtype=np.uint64))
+    four = Observation(*(np.tile(getattr(SEEN, name), 2) for name in Observation.__match_args__))
+    log_odds, acceleration = blocks.decide(four, np.array([True, True, True, False]))
+    assert log_odds.tolist() == [2.0, 1.0, 1.0, 1.0]
+    assert np.isfinite(acceleration).all()
+    idle, _ = blocks.decide(four, np.array([False, False, True, False]))
+    assert idle.tolist() == [0.0, 0.0, 2.0, 2.0]  # the first block was left out
+    assert blocks.decide(four, np.array([True, False, False, False]))[0].tolist()[:2] == [3.0, 2.0]

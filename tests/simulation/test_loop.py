@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cases import random_encounters
 
+from merge_cosim.controllers.acc import Acc
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.observation import Setting
@@ -11,10 +12,12 @@ from merge_cosim.estimators.base import estimators
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.merging_cars.base import merging_cars
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.scoring.scoring import Rules
+from merge_cosim.scoring.rules import Rules
 from merge_cosim.simulation.host_driver import HostDriver
+from merge_cosim.simulation.leader import LeaderRule
 from merge_cosim.simulation.loop import Run, simulate
-from merge_cosim.simulation.worlds.tiles import ClosedFormWorld, TiledWorld
+from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
+from merge_cosim.simulation.worlds.tiles import TiledWorld
 from merge_cosim.sumo.lane_map import LaneMap
 
 
@@ -57,11 +60,13 @@ def test_speeds_are_those_that_sumo_reports(ramp, merge_position):
     road = Ramp.load(ramp)
     world = TiledWorld(road, 16)
     rng = np.random.default_rng(6)
+    world.start(encounters, Setting(), Rules(), LeaderRule(Acc(), Setting()), 0)
     try:
         for _ in range(2):  # the second time the cars come from where the first encounters ended
-            world.place(np.arange(16), encounters, np.arange(16))
+            world.place(np.arange(16), np.arange(16))
             for _ in range(120):  # across edges and the lane change
-                world.advance(rng.uniform(0, 30, (2, 16)))
+                world.command(rng.uniform(0, 30, (2, 16)))
+                world.step()
                 for role, speeds in zip(("host", "merging"), world.state[2:], strict=True):
                     reported = [libsumo.vehicle.getSpeed(f"t{tile}.{role}") for tile in range(16)]
                     np.testing.assert_allclose(speeds, reported, atol=1e-9)
@@ -96,15 +101,15 @@ def test_order_and_neighbours_do_not_matter():
 
 def test_a_case_alone_ends_as_in_its_batch_and_can_be_traced():
     encounters = random_encounters(40, seed=4)
-    batch = on_sumo("designed", 16, encounters, "acc", traced=(5,))
-    alone = on_sumo("designed", 1, encounters.take(np.array([5])), "acc", traced=(0,))
+    batch = on_sumo("designed", 16, encounters, "acc", traced={"r5"})
+    alone = on_sumo("designed", 1, encounters.take(np.array([5])), "acc", traced={"r5"})
     for name, column in batch.columns.items():
         np.testing.assert_array_equal(column[5:6], alone.columns[name], err_msg=name)
-    assert batch.traces[5] == alone.traces[0]
-    trace = alone.traces[0]
+    trace = alone.traces["r5"]
+    assert batch.traces["r5"].equals(trace)
     assert len(trace["time_s"]) == alone.columns["end_cycle"][0]
     assert trace["host_station_m"][0] == np.round(encounters.host_station[5], 6)
-    assert trace["time_s"][:4] == [0.0, 0.1, 0.2, 0.3]
+    assert trace["time_s"][:4].tolist() == [0.0, 0.1, 0.2, 0.3]
     # one cycle of the trace obeys the law of motion
     assert trace["host_station_m"][1] == pytest.approx(
         trace["host_station_m"][0] + 0.1 * trace["host_speed_m_s"][1], abs=2e-6
@@ -127,7 +132,7 @@ def test_a_car_in_the_lane_is_followed_iff_it_is_ahead_whatever_is_believed(meth
         host_length=5.0,
         merging_length=5.0,
     )
-    trace = run(ClosedFormWorld(1), case, method, traced=(0,)).traces[0]
+    trace = run(ClosedFormWorld(1), case, method, traced={"c"}).traces["c"]
     in_lane = np.array(trace["merging_station_m"]) >= 0
     first = int(np.argmax(in_lane))
     assert 0 < first < 20

@@ -11,7 +11,7 @@ from merge_cosim.core.encounter import NEVER, Encounters, Ragged, ReplayLog
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import Setting
 from merge_cosim.scenarios.scenario import load_scenario
-from merge_cosim.scoring.scoring import Rules
+from merge_cosim.scoring.rules import Rules
 from merge_cosim.studies.bounds import bounds, summarise_bounds
 from merge_cosim.studies.minimum_delay import Ahead, Reach, earliest_pass_behind
 

@@ -35,6 +35,12 @@ def test_the_end_of_sumo_in_mid_run_is_told():
     finally:
         running.kill()
         running.wait()
-    with pytest.raises(UserError, match="SUMO has ended before the case was over"), connection_kept():
-        world.advance(np.zeros((2, 1)))
+
+    def one_cycle():
+        with connection_kept():
+            world.command(np.zeros((2, 1)))
+            world.step()
+
+    with pytest.raises(UserError, match="SUMO has ended before the case was over"):
+        one_cycle()
     world.close()

@@ -105,7 +105,7 @@ def test_workers_with_several_threads_are_refused(tmp_path):
 def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path):
     other = tmp_path / "other" / "merge_cosim"
     shutil.copytree(Path(merge_cosim_package.__file__).parent, other, ignore=shutil.ignore_patterns("__pycache__"))
-    with (other / "units.py").open("a") as file:
+    with (other / "core" / "units.py").open("a") as file:
         file.write("# edited\n")
     with cluster(tmp_path / "cluster", workers=1, PYTHONPATH=str(other.parent)) as (address, _):
         done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", address, cwd=tmp_path)

@@ -137,8 +137,8 @@ def test_pieces_cover_all_cases_once():
     for batch in {id(chunk.whole): chunk.whole for chunk in found}.values():
         own = [chunk for chunk in found if chunk.whole is batch]
         assert [chunk.first for chunk in own] == [0, 40, 80]
-        assert own[-1].last == len(batch.encounters)
-        assert own[1].task().encounters.case.tolist() == batch.encounters.case[40:80].tolist()
+        assert own[-1].last == len(batch)
+        assert own[1].task().cases.encounters.case.tolist() == batch.cases.encounters.case[40:80].tolist()
 
 
 def test_the_longest_piece_goes_first_once_methods_are_known():

@@ -14,14 +14,12 @@ from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics.comparison import compare
 from merge_cosim.results.statistics.rates import bootstrap_means, count, mean, percent, quantile, wilson
 from merge_cosim.scenarios.methods import CONSTANT, ORACLE_BEST
+from merge_cosim.simulation.worlds.traffic import TRAFFIC
 
 CASE = ["scenario", "variation", "source", "site", "case"]
 GROUP = ["scenario", "variation", "site", "source", "method", "model"]
 SECTION = ["scenario", "variation", "site", "source"]
 ALL_SITES = "all"
-TRAFFIC = "traffic"
-"""The source of meetings in living traffic. What a host does there changes all that follows, so that two methods have
-no cases in common."""
 AMBIGUITY_EDGES = (0.0, 1.0, 3.0, np.inf)
 """Strata of |T_m - T_h| at the start [s]."""
 ALL_STARTS = "all"

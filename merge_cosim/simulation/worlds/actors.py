@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from merge_cosim.scoring.tracks import DECIMALS
+from merge_cosim.core.observation import DECIMALS
 from merge_cosim.sumo.lane_map import LaneMap, Part, RampLane
 from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.vehicle_types import ROLE

@@ -1,14 +1,11 @@
-"""Meetings: a host and a merging car that may come to merge beside it, and what was recorded of them."""
+"""Meetings in living traffic: a host and a merging car that may come to merge beside it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import Enum
+from dataclasses import dataclass
 
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from merge_cosim.core.units import FloatArray
 from merge_cosim.simulation.worlds.actors import Actor
 
 MARGIN = 0.1
@@ -33,60 +30,44 @@ class Attention:
 DEFAULT_ATTENTION = Attention()
 
 
-class Ending(Enum):
-    """How a meeting ended."""
-
-    OPEN = "open"
-    SCORED = "scored"
-    """The car merged next to the host, and the horizon was seen."""
-    CENSORED = "censored"
-    """The car merged next to the host; then one of them left the host lane or the net."""
-    NOT_NEXT = "not next"
-    """Another car was between them when it merged, or it did not merge beside this host at all."""
-
-
 @dataclass(eq=False)
 class Meeting:
-    """A host and a merging car, from when the host attends to it.
+    """A host and a merging car, from when the host attends to it; an encounter if the car merges next to the host.
 
     Attributes:
         host, merging: The two.
-        begin: Cycle of the scene in which it began.
-        states: `RECORDED`, one array per cycle.
-        merged_at: Index into `states` of the first cycle in the host lane; -1 before.
+        slot: The slot that it has.
+        begun: Cycle of the world in which it began.
+        start: x and speed of the host, then of the merging car, in that cycle [m past the gore, m/s].
+        merged_at: Cycle of the first state in the host lane; -1 before.
         merge_position: x of the lane change [m past the gore].
-        both_at: Index of the first cycle in which both are past it; -1 before.
+        both_at: Cycle of the first state in which both are past it; -1 before.
         stopped: The merging car stood before it could merge.
-        ending: How it ended.
+        collided: SUMO has reported a contact of the two before scoring ended.
+        over: Scoring has ended.
+        cut_off: It ended before its horizon had been seen, because one of the two left the host lane or the net.
     """
 
     host: Actor
     merging: Actor
-    begin: int
-    states: list[FloatArray] = field(default_factory=list)
+    slot: int
+    begun: int
+    start: tuple[float, float, float, float]
     merged_at: int = -1
     merge_position: float = 0.0
     both_at: int = -1
     stopped: bool = False
-    ending: Ending = Ending.OPEN
+    collided: bool = False
+    over: bool = False
+    cut_off: bool = False
+
+    @property
+    def name(self) -> str:
+        """Names of the two."""
+        return f"{self.host.name}/{self.merging.name}"
 
     def merging_point(self, usual: float) -> float:
         """Where the car merges, as far as one can know [m past the gore]; `usual` is where cars merge on this ramp."""
         if self.merged_at >= 0:
             return self.merge_position
         return max(usual, self.merging.x + MARGIN)
-
-    def record(
-        self, log_odds: float, leader_gap: float, leader_speed: float, follower_gap: float, contact: bool
-    ) -> None:
-        """Keep one cycle."""
-        state = (self.host.x, self.host.speed, self.merging.x, self.merging.speed)
-        self.states.append(np.array([*state, log_odds, leader_gap, leader_speed, follower_gap, contact]))
-        self.stopped |= self.merged_at < 0 and self.merging.speed < STANDING
-
-
-RECORDED = (
-    *("host_x", "host_speed", "merging_x", "merging_speed"),
-    *("log_odds", "leader_gap", "leader_speed", "follower_gap", "contact"),
-)
-"""What is recorded of a meeting in every cycle; gaps are bumper to bumper, inf without a car [m, m/s]."""

@@ -10,7 +10,7 @@ import pandas as pd
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.report.methods import in_order
 from merge_cosim.studies.reproduction import Study
-from merge_cosim.sweeps.plan import plan_encounters
+from merge_cosim.sweeps.plan import plan
 from merge_cosim.sweeps.single import trace_methods
 
 LOGGED_METHODS = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg-gmm", "dbn-pf", "human")
@@ -52,7 +52,8 @@ class NamedCase:
 def published_case(study: Study) -> NamedCase:
     """The pair nearest to the published initial state, and whether it is near enough to be the same."""
     request = replace(study.request, scenarios=("us101-replay",), methods=LOGGED_METHODS)
-    encounters = plan_encounters(request)[0].encounters
+    encounters = plan(request)[0].cases.encounters
+    assert encounters is not None
     away = [np.abs(getattr(encounters, name) - value) / NEAR[name] for name, value in WANTED.items()]
     distance = np.max(away, axis=0)
     nearest = int(np.argmin(distance))
@@ -63,7 +64,8 @@ def published_case(study: Study) -> NamedCase:
 def behind_but_accelerating(study: Study) -> NamedCase:
     """The situation of Fig. 3: the merging car is behind the host and accelerates."""
     request = replace(study.request, scenarios=("designed-2",), methods=BEHIND_METHODS, settings={})
-    encounters = plan_encounters(request)[0].encounters
+    encounters = plan(request)[0].cases.encounters
+    assert encounters is not None
     row = int(np.flatnonzero(encounters.case == BEHIND_CASE)[0])
     return NamedCase(BEHIND_CASE, _start(encounters, row), True, *trace_methods(request, BEHIND_CASE))
 

@@ -1,4 +1,4 @@
-"""The human host: his stations are the log's, his measures those of the log, and he never fails on real pairs."""
+"""The recorded host: its stations and measures are those of the log, and it never fails on real pairs."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,14 @@ from merge_cosim.core.observation import Setting
 from merge_cosim.merging_cars.replay import Replay
 from merge_cosim.ngsim.pairing.encounters import site_encounters
 from merge_cosim.ngsim.sites import site
-from merge_cosim.scoring.scoring import Rules
-from merge_cosim.sweeps.human import simulate_human
+from merge_cosim.scoring.rules import Rules
+from merge_cosim.simulation.loop import simulate
+from merge_cosim.simulation.worlds.logged_host import LoggedHostWorld, Undecided
+
+
+def run_logged(encounters, traced=()):
+    world = LoggedHostWorld(len(encounters))
+    return simulate(world, encounters, Undecided(), Replay(), Rules(), Setting(), traced)
 
 
 def logged_pair(host, merging, label=0):
@@ -29,14 +35,14 @@ def logged_pair(host, merging, label=0):
     return Encounters(**text, **numbers, label=one([label]), **flags, log=log)
 
 
-def test_the_human_meets_his_log_and_goes_on_after_it():
+def test_the_host_meets_its_log_and_goes_on_after_it():
     cycles = np.arange(60)
     host, merging = -60.0 + 1.5 * cycles, -50.0 + 1.0 * cycles  # 15 m/s and 10 m/s: 2.5 s late
-    run = simulate_human(logged_pair(host, merging), Replay(), Rules(), Setting(), traced=(0,))
-    trace = run.traces[0]
+    run = run_logged(logged_pair(host, merging), traced={"x"})
+    trace = run.traces["x"]
     logged = min(60, len(trace["host_station_m"]))
     np.testing.assert_allclose(trace["host_station_m"][:logged], host[:logged], atol=1e-6)
-    assert trace["host_station_m"][-1] > host[-1]
+    assert trace["host_station_m"].iloc[-1] > host[-1]
     c = {name: column[0] for name, column in run.columns.items()}
     assert c["host_reached_s"] == pytest.approx(4.0)
     assert c["distance_m"] == pytest.approx(10.0)  # the merging car has 1.0 s to go
@@ -52,7 +58,7 @@ def test_real_hosts_never_fail_and_keep_the_logs_distance(data_dir, name):
     encounters = site_encounters(data_dir, site(name))
     if encounters is None or not len(encounters):
         pytest.skip(f"no pairs of {name}")
-    run = simulate_human(encounters, Replay(), Rules(), Setting())
+    run = run_logged(encounters)
     assert not run.columns["kind"].any()
     for row in range(len(encounters)):
         host, merging = encounters.log.host_station[row], encounters.log.merging_station[row]

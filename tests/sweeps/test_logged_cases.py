@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,14 @@ from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.tracks import build_tracks
 from merge_cosim.ngsim.sites import site
 from merge_cosim.results.store import SCENE_FACTS
+from merge_cosim.scenarios.logged_scenes import load_scenes
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import load_scenario
-from merge_cosim.sweeps.full_scene_task import SceneReplay, load_scenes
+from merge_cosim.simulation.worlds.logged_rules import FullScene
+from merge_cosim.sweeps.cases import LoggedCases, PairCases
 from merge_cosim.sweeps.plan import SweepRequest, plan
-from merge_cosim.sweeps.task import Batch, WorkerSession
+from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.worker_session import WorkerSession
 
 US101 = site("us101")
 
@@ -42,7 +46,7 @@ MERGING = wavy(2, [7] * 40 + [6] * 60 + [5] * 150, at=-30, speed=14, phase=2.0)
 BESIDE = [steady(10 + k, [lane] * 250, at=-140.0 + 25 * k, speed=15) for k, lane in enumerate((1, 2, 3, 4, 4, 3, 2))]
 
 
-def batches(*cars: Car, method: str = "acc", host: str = "-h1.1", **settings: Any) -> tuple[Batch, SceneReplay]:
+def batches(*cars: Car, method: str = "acc", host: str = "-h1.1", **settings: Any) -> tuple[Task, Task]:
     """The pair of cars 1 and 2, or that of other hosts, alone and among all cars."""
     logged = table(*cars)
     pairs = extract_pairs(logged, US101, PairRules(), "ngsim").encounters
@@ -51,11 +55,13 @@ def batches(*cars: Car, method: str = "acc", host: str = "-h1.1", **settings: An
     scenario = load_scenario("us101-scene", {f"full_scene.{name}": value for name, value in settings.items()})
     chosen = Method.of(method)
     model = IntentionModel.load("us101-ngsim") if chosen.needs_model else None
-    batch = Batch(scenario=scenario, method=chosen, model=model, encounters=pairs)
-    return batch, SceneReplay.of(batch, scenes)
+    assert scenario.full_scene is not None
+    kinds = (PairCases(pairs), LoggedCases.of(pairs, scenario.full_scene, scenes))
+    alone, among = (Task(scenario=scenario, cases=cases, method=chosen, model=model) for cases in kinds)
+    return alone, among
 
 
-def row_of(batch: Batch) -> dict[str, Any]:
+def row_of(batch: Task) -> dict[str, Any]:
     worker_session = WorkerSession()
     rows = batch.run(worker_session)[0]
     worker_session.close()
@@ -63,7 +69,7 @@ def row_of(batch: Batch) -> dict[str, Any]:
     return row
 
 
-def facts_of(batch: Batch) -> tuple[dict[str, Any], dict[str, Any]]:
+def facts_of(batch: Task) -> tuple[dict[str, Any], dict[str, Any]]:
     """The result row and the scene's facts."""
     rows = batch.run(WorkerSession())[0]
     (facts,) = json.loads(rows.schema.metadata[SCENE_FACTS])
@@ -157,12 +163,14 @@ def test_real_pairs_have_the_rows_of_the_pair_test_when_the_leader_is_not_heeded
     request = SweepRequest(["us101-replay"], ["acc", "pgm"], data=data_dir)
     scenes, worker_session = None, WorkerSession()
     for batch in plan(request):
-        assert isinstance(batch, Batch)
         scenario = load_scenario("us101-scene", {"full_scene.heed_leader": False})
         scenes = scenes or load_scenes(scenario, "ngsim", data_dir)
         few = batch.take(np.arange(0, len(batch), 3))
         alone = few.run(worker_session)[0]
-        among = SceneReplay.of(Batch(**{**vars(few), "scenario": scenario}), scenes).run(worker_session)[0]
+        assert scenario.full_scene is not None
+        assert few.cases.encounters is not None
+        cases = LoggedCases.of(few.cases.encounters, scenario.full_scene, scenes)
+        among = replace(few, scenario=scenario, cases=cases).run(worker_session)[0]
         for one, other in zip(alone.to_pylist(), among.to_pylist(), strict=True):
             left_out = ("scenario", "sumo_collision")
             if other["failure_kind"] == "host_into_leader":
@@ -184,8 +192,8 @@ def test_a_case_does_not_feel_the_others_of_its_batch() -> None:
 
 def test_a_part_has_its_own_scene_and_the_digest_sees_all_cars() -> None:
     among = batches(HOST, MERGING, *BESIDE)[1]
-    assert len(among.part(0, 1).places) == len(among.take(np.array([0, 0])).places) / 2 == 1
-    assert among.part(0, 0).places == ()
+    assert len(among.part(0, 1).cases.places) == len(among.take(np.array([0, 0])).cases.places) / 2 == 1
+    assert among.part(0, 0).cases.places == ()
     assert among.digest() == batches(HOST, MERGING, *BESIDE)[1].digest()
     assert among.digest() != batches(HOST, MERGING, *BESIDE[1:])[1].digest()
     assert isinstance(among.run(WorkerSession())[0], pa.Table)
@@ -211,4 +219,4 @@ def test_what_makes_no_full_scene_is_refused(name: str, settings: dict[str, Any]
 def test_a_pair_without_a_scene_is_told() -> None:
     batch, _ = batches(HOST, MERGING)
     with pytest.raises(UserError, match="no scene holds the pair"):
-        SceneReplay.of(batch, {})
+        LoggedCases.of(batch.cases.encounters, FullScene(), {})

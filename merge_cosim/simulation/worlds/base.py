@@ -1,0 +1,229 @@
+"""The world protocol: what moves the cars of encounters, each of which has a slot as long as it lasts."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from merge_cosim.core.encounter import NEVER, Encounters
+from merge_cosim.core.observation import Setting
+from merge_cosim.core.random_streams import Keys, stream_keys
+from merge_cosim.core.units import AnyArray, FloatArray, IntArray
+from merge_cosim.scoring.rules import Rules, expected_cycles
+
+if TYPE_CHECKING:
+    from merge_cosim.simulation.leader import LeaderRule
+
+
+@dataclass(frozen=True)
+class Begun:
+    """Encounters that begin in the present cycle; m of them.
+
+    Attributes:
+        slots: Where, shape (m,).
+        cases: Their numbers in `World.encounters`, where these are known beforehand. Shape (m,).
+        start: Stations of host and merging car, their speeds, their lengths [m, m/s, m], shape (6, m).
+        labels: What log or script say of each driver (`Intention`), shape (m,).
+        keys: Keys of their random streams, shape (m,).
+        score_until: Last cycle of each that may be scored; `NEVER` without one. Shape (m,).
+        around: Values of the world's channels, shape (channels, m).
+    """
+
+    slots: IntArray
+    cases: IntArray
+    start: FloatArray
+    labels: IntArray
+    keys: Keys
+    score_until: IntArray
+    around: FloatArray
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Encounters that have ended; their slots are free.
+
+    Attributes:
+        slots: Where, shape (m,).
+        cases: Their numbers in `World.encounters`; -1 for those that are not scored. Shape (m,).
+        names: Their names.
+        back: How many of the last recorded states are no longer theirs.
+        begun_at: Time in the world at which each began [s], shape (m,).
+        points: Where station 0 turned out to be, for worlds that find it out on the way [m past the gore].
+    """
+
+    slots: IntArray
+    cases: IntArray
+    names: AnyArray
+    back: int = 0
+    begun_at: FloatArray | None = None
+    points: FloatArray | None = None
+
+
+class World(ABC):
+    """Moves the cars of a simulation. The loop (`merge_cosim.simulation.loop`) does not know which world it drives.
+
+    One cycle is: `command`, `step`, `observe`, `ended`, `begin`.
+
+    Attributes:
+        kind: What moves the cars: `sumo` or `closed-form`.
+        channels: What is recorded of each encounter and cycle beside both cars' states.
+        slots: Number of slots; it may grow.
+        step_s: Time [s] spent inside the steps of what moves the cars; commanding and reading is not in it.
+        vehicle_steps: Cars times steps, where the world counts them; None for the two cars of each encounter.
+        worst_difference_m: Largest difference of the stations from the closed form, at an encounter's end [m].
+    """
+
+    kind: ClassVar[str] = "sumo"
+    channels: ClassVar[tuple[str, ...]] = ()
+    slots: int
+    step_s: float = 0.0
+    vehicle_steps: int | None = None
+    worst_difference_m: float = 0.0
+
+    @abstractmethod
+    def start(
+        self, encounters: Encounters | None, setting: Setting, rules: Rules, leader: LeaderRule, seed: int
+    ) -> None:
+        """Make ready for a run.
+
+        Args:
+            encounters: What is to be run; None for a world that finds its encounters.
+            setting: Speed limit and cycle.
+            rules: When an encounter is scored.
+            leader: How a host drives behind a leader, and freely.
+            seed: Seed of the encounters' random streams.
+        """
+
+    @property
+    @abstractmethod
+    def goes_on(self) -> bool:
+        """There is something left to simulate."""
+
+    @property
+    @abstractmethod
+    def encounters(self) -> Encounters:
+        """All encounters of the run; of a world that finds them those that are to be scored so far."""
+
+    @abstractmethod
+    def begin(self) -> Begun | None:
+        """Begin encounters in free slots; None if there are none."""
+
+    @abstractmethod
+    def command(self, speeds: FloatArray) -> None:
+        """Set the speeds [m/s] of the next step, of hosts and merging cars, shape (2, slots)."""
+
+    @abstractmethod
+    def step(self) -> None:
+        """Simulate one cycle and take in what came of it."""
+
+    @abstractmethod
+    def observe(self, state: FloatArray, around: FloatArray) -> None:
+        """Write what can be observed: stations and speeds, shape (4, slots), and the channels, (channels, slots)."""
+
+    @abstractmethod
+    def ended(self, over: IntArray, age: IntArray) -> Ended | None:
+        """Free the slots of encounters that have ended by the present state; None if there are none.
+
+        Args:
+            over: Slots of the encounters whose scoring ends with the present state.
+            age: Cycles since each slot's encounter began, shape (slots,).
+        """
+
+    def finish(self, age: IntArray) -> Ended | None:
+        """End what is still open when the run ends."""
+        return None
+
+    @property
+    def leader(self) -> FloatArray | None:
+        """Gap to the car ahead of each host [m], inf without one, and its speed [m/s], shape (2, slots)."""
+        return None
+
+    def settled(self, track: FloatArray, point: float) -> FloatArray:
+        """A recorded track with its stations counted from where station 0 turned out to be; see `Ended.points`."""
+        return track
+
+    def columns(self) -> dict[str, AnyArray]:
+        """Further columns of the encounters, shape (n,) each; `sumo_collision`: SUMO reported their contact."""
+        return {"sumo_collision": np.zeros(len(self.encounters), dtype=bool)}
+
+    def close(self) -> None:
+        """End the simulation."""
+
+
+class GivenWorld(World):
+    """A world whose encounters are known beforehand: a slot that becomes free takes the next one.
+
+    The encounters that will last longest go first, so that all slots end together. What a subclass adds: `place`,
+    `command`, `step`, `observe`.
+
+    Attributes:
+        collided: Slots in which a contact was reported since the encounter there began, shape (slots,).
+    """
+
+    def __init__(self, slots: int) -> None:
+        self.slots = slots
+        self.collided = np.zeros(slots, dtype=bool)
+        self._ever_collided = np.zeros(0, dtype=bool)
+        self._case = np.full(slots, -1)
+        self._active = 0
+
+    @abstractmethod
+    def place(self, slots: IntArray, cases: IntArray) -> FloatArray:
+        """Put the encounters `cases` at their initial states into `slots`; returns their channels."""
+
+    def start(
+        self, encounters: Encounters | None, setting: Setting, rules: Rules, leader: LeaderRule, seed: int
+    ) -> None:
+        """See `World`."""
+        assert encounters is not None
+        self._encounters, n = encounters, len(encounters)
+        self._keys = stream_keys(encounters.case, seed)
+        self._score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
+        self._queue = np.argsort(-expected_cycles(encounters, rules), kind="stable")
+        self._free = np.arange(self.slots)
+        self._ever_collided = np.zeros(n, dtype=bool)
+        self._case[:] = -1
+        self._active = 0
+        self.worst_difference_m = 0.0
+
+    @property
+    def encounters(self) -> Encounters:
+        """See `World`."""
+        return self._encounters
+
+    @property
+    def goes_on(self) -> bool:
+        """See `World`."""
+        return self._active > 0
+
+    def begin(self) -> Begun | None:
+        """See `World`."""
+        count = min(len(self._free), len(self._queue))
+        if not count:
+            return None
+        cases, self._queue = self._queue[:count], self._queue[count:]
+        slots, self._free = self._free[:count], self._free[count:]
+        self._case[slots] = cases
+        self._active += count
+        self.collided[slots] = False
+        around = self.place(slots, cases)
+        start, labels = self._encounters.start[:, cases], self._encounters.label[cases]
+        return Begun(slots, cases, start, labels, self._keys[cases], self._score_until[cases], around)
+
+    def ended(self, over: IntArray, age: IntArray) -> Ended | None:
+        """See `World`; an encounter ends when its scoring does."""
+        if not len(over):
+            return None
+        cases = self._case[over]
+        self._ever_collided[cases] = self.collided[over]
+        self._case[over] = -1
+        self._free = over
+        self._active -= len(over)
+        return Ended(over, cases, self._encounters.case[cases])
+
+    def columns(self) -> dict[str, AnyArray]:
+        """See `World`."""
+        return {"sumo_collision": self._ever_collided}

@@ -1,0 +1,393 @@
+"""What a task runs: encounters of pairs, encounters among logged cars, or scenes of living traffic."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from merge_cosim.core.encounter import Encounters
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import did_you_mean
+from merge_cosim.core.units import DT, FloatArray, IntArray
+from merge_cosim.ngsim.pairing.recordings import LoggedScene, pair_in_scene
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.view import view_options
+from merge_cosim.scenarios.sources import Routes, Traffic
+from merge_cosim.scoring.rules import Rules, expected_cycles
+from merge_cosim.simulation.loop import Run
+from merge_cosim.simulation.worlds.base import World
+from merge_cosim.simulation.worlds.logged import LoggedWorld, Place
+from merge_cosim.simulation.worlds.logged_host import LoggedHostWorld
+from merge_cosim.simulation.worlds.logged_rules import FullScene
+from merge_cosim.simulation.worlds.scene import Scene
+from merge_cosim.simulation.worlds.tiles import TiledWorld
+from merge_cosim.sumo.attach import Address, AttachedSession
+from merge_cosim.sumo.configuration import Configuration
+from merge_cosim.sumo.demand import write_traffic
+from merge_cosim.sumo.options import SumoOptions, delay_option
+from merge_cosim.sumo.session import Session
+from merge_cosim.sumo.start import TraciSession
+from merge_cosim.sumo.tiles import tile_id
+from merge_cosim.sweeps.worker_session import WorkerSession
+
+CHUNK_CASES = 1_000
+"""Most encounters that are handed out at a time: enough to keep the tiles busy, few enough to lose little when
+interrupted."""
+USUAL_LENGTH = 600.0
+"""Length of a scene [s] where its configuration does not say."""
+
+Facts = list[dict[str, Any]]
+"""What there is to say of scenes as a whole; none for pairs."""
+
+
+class Opened(NamedTuple):
+    """A world to run in.
+
+    Attributes:
+        world: The world.
+        seed: Seed of the random streams of its encounters.
+        facts: What gives the facts of a finished run.
+    """
+
+    world: World
+    seed: int
+    facts: Callable[[Run], Facts]
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a single case is run otherwise than in a sweep.
+
+    Attributes:
+        gui_delay: Milliseconds per step in sumo-gui; None runs without a window.
+        extra: Further options of SUMO.
+        attach: Drive in the SUMO that listens there, instead of a new one.
+    """
+
+    gui_delay: int | None = None
+    extra: tuple[str, ...] = ()
+    attach: Address | None = None
+
+
+AS_IN_A_SWEEP = RunOptions()
+
+
+class Cases(ABC):
+    """Some cases of a scenario.
+
+    Attributes:
+        most: Most of them that are handed out at a time.
+    """
+
+    most: ClassVar[int]
+
+    @property
+    @abstractmethod
+    def encounters(self) -> Encounters | None:
+        """The encounters; None where they are found on the way."""
+
+    @abstractmethod
+    def __len__(self) -> int: ...
+
+    @abstractmethod
+    def name(self, number: int) -> str:
+        """Name of a case."""
+
+    @abstractmethod
+    def part(self, first: int, last: int) -> Self:
+        """The cases `first` to `last - 1`."""
+
+    @abstractmethod
+    def take(self, rows: IntArray) -> Self:
+        """The chosen cases, in that order."""
+
+    @abstractmethod
+    def cycles(self, rules: Rules) -> FloatArray:
+        """Expected cycles of each case, shape (len(self),)."""
+
+    @abstractmethod
+    def digest(self, ramp: Ramp) -> str:
+        """A short hash of what the cases hold."""
+
+    @abstractmethod
+    def worlds(
+        self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
+    ) -> Iterator[AbstractContextManager[Opened]]:
+        """The worlds in which the cases are run, one after the other; each is closed before the next is opened.
+
+        Args:
+            ramp: The ramp.
+            seed: SUMO's seed.
+            worker_session: Keeps a SUMO open from chunk to chunk.
+            options: How a single case is run.
+            human: The hosts drive as they were logged, without SUMO.
+        """
+
+    def find(self, case: str) -> int:
+        """Number of a case by its name, or of the one in which it is found.
+
+        Raises:
+            UserError: There is none.
+        """
+        names = [self.name(number) for number in range(len(self))]
+        if case in names:
+            return names.index(case)
+        few = did_you_mean(case, names) if len(names) <= 12 else f" (such as {names[0]}, {names[-1]})"
+        raise UserError(f"no case '{case}'{few}")
+
+
+@dataclass(frozen=True)
+class PairCases(Cases):
+    """Encounters of a host and a merging car alone.
+
+    Attributes:
+        pairs: The encounters.
+    """
+
+    most: ClassVar[int] = CHUNK_CASES
+    pairs: Encounters
+
+    @property
+    def encounters(self) -> Encounters:
+        """See `Cases`."""
+        return self.pairs
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    def name(self, number: int) -> str:
+        """See `Cases`."""
+        return str(self.pairs.case[number])
+
+    def part(self, first: int, last: int) -> Self:
+        """See `Cases`."""
+        return replace(self, pairs=self.pairs.part(first, last))
+
+    def take(self, rows: IntArray) -> Self:
+        """See `Cases`."""
+        return replace(self, pairs=self.pairs.take(rows))
+
+    def find(self, case: str) -> int:
+        """See `Cases`."""
+        found = np.flatnonzero(self.pairs.case == case)
+        return int(found[0]) if len(found) else super().find(case)
+
+    def cycles(self, rules: Rules) -> FloatArray:
+        """See `Cases`."""
+        return expected_cycles(self.pairs, rules)
+
+    def digest(self, ramp: Ramp) -> str:
+        """See `Cases`."""
+        return self.pairs.digest
+
+    def worlds(
+        self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
+    ) -> Iterator[AbstractContextManager[Opened]]:
+        """See `Cases`; a single world."""
+        yield self._opened(ramp, seed, worker_session, options, human)
+
+    @contextmanager
+    def _opened(
+        self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
+    ) -> Iterator[Opened]:
+        if human:
+            yield Opened(LoggedHostWorld(len(self)), seed, _no_facts)
+        elif options == AS_IN_A_SWEEP:
+            yield Opened(worker_session.world(ramp, len(self), seed), seed, _no_facts)
+        else:
+            worker_session.close()
+            world = _single_world(ramp, seed, options)
+            try:
+                yield Opened(world, seed, _no_facts)
+            finally:
+                world.close()
+
+
+def _no_facts(run: Run) -> Facts:
+    return []
+
+
+def _single_world(ramp: Ramp, seed: int, options: RunOptions) -> TiledWorld:
+    """SUMO for one encounter."""
+    attach = options.attach
+    if attach is not None:
+        return TiledWorld(ramp, 1, seed, lambda sumo: AttachedSession(sumo, attach), tiled=False)
+    if options.gui_delay is None:
+        return TiledWorld(ramp, 1, seed, extra=options.extra)
+    shown = (*view_options(ramp.net.parent), *delay_option(options.gui_delay))
+    world = TiledWorld(ramp, 1, seed, _open_window, (*shown, *options.extra))
+    world.session.follow(tile_id(0, "host"))
+    return world
+
+
+def _open_window(options: SumoOptions) -> Session:
+    return TraciSession(options, gui=True)
+
+
+@dataclass(frozen=True)
+class LoggedCases(PairCases):
+    """Encounters among all cars that were logged with them.
+
+    Attributes:
+        full_scene: How the other cars take part.
+        places: The scene of each encounter, and where in it.
+    """
+
+    most: ClassVar[int] = 1
+    full_scene: FullScene
+    places: tuple[Place, ...]
+
+    @classmethod
+    def of(cls, pairs: Encounters, full_scene: FullScene, scenes: dict[str, LoggedScene]) -> Self:
+        """Find the scenes of some encounters.
+
+        Raises:
+            UserError: There is none for an encounter.
+        """
+        try:
+            places = tuple(pair_in_scene(scenes, pairs, row) for row in range(len(pairs)))
+        except KeyError as error:
+            raise UserError(f"no scene holds the pair ({error})") from None
+        return cls(pairs, full_scene, places)
+
+    def part(self, first: int, last: int) -> Self:
+        """See `Cases`."""
+        return replace(super().part(first, last), places=self.places[first:last])
+
+    def take(self, rows: IntArray) -> Self:
+        """See `Cases`."""
+        return replace(super().take(rows), places=tuple(self.places[int(row)] for row in rows))
+
+    def digest(self, ramp: Ramp) -> str:
+        """See `Cases`; of all cars around the encounters, too."""
+        scenes = {scene.recording: scene.digest for scene, _ in self.places}
+        return hashlib.sha256(f"{super().digest(ramp)} {scenes}".encode()).hexdigest()[:16]
+
+    @contextmanager
+    def _opened(
+        self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
+    ) -> Iterator[Opened]:
+        if human:
+            with super()._opened(ramp, seed, worker_session, options, human) as opened:
+                yield opened
+            return
+        if options.attach is not None:
+            raise UserError("--attach: not with full_scene, which starts SUMO with a recording's cars; leave it out")
+        worker_session.close()
+        world = LoggedWorld(ramp, self.places, self.full_scene, seed, options.gui_delay, options.extra)
+        try:
+            yield Opened(
+                world,
+                seed,
+                lambda _: [{"scene": self.name(n), "seed": seed, **world.facts[n]} for n in sorted(world.facts)],
+            )
+        finally:
+            world.close()
+
+
+@dataclass(frozen=True)
+class TrafficCases(Cases):
+    """Scenes of living traffic, which differ by SUMO's seed; their encounters are found on the way.
+
+    Attributes:
+        traffic: Where the cars come from.
+        first, last: The scenes `first` to `last - 1`.
+    """
+
+    most: ClassVar[int] = 1
+    traffic: Traffic | Routes
+    first: int
+    last: int
+
+    @property
+    def encounters(self) -> None:
+        """See `Cases`."""
+        return None
+
+    def __len__(self) -> int:
+        return self.last - self.first
+
+    def name(self, number: int) -> str:
+        """See `Cases`; it begins the names of the scene's encounters."""
+        return f"{self.first + number:03d}"
+
+    def part(self, first: int, last: int) -> Self:
+        """See `Cases`."""
+        return replace(self, first=self.first + first, last=self.first + last)
+
+    def take(self, rows: IntArray) -> Self:
+        """See `Cases`; the scenes must follow each other."""
+        return self.part(int(rows[0]), int(rows[-1]) + 1)
+
+    def find(self, case: str) -> int:
+        """See `Cases`; `SCENE` or `SCENE/HOST/MERGING`."""
+        return super().find(case.partition("/")[0])
+
+    def cycles(self, rules: Rules) -> FloatArray:
+        """See `Cases`; once per car that is usually there."""
+        length = self.traffic.demand.duration if isinstance(self.traffic, Traffic) else USUAL_LENGTH
+        return np.full(len(self), length / DT)
+
+    def digest(self, ramp: Ramp) -> str:
+        """See `Cases`; of the files of a scene. What generated traffic depends on is in the scenario."""
+        files = Configuration.read(self.traffic.file).files if isinstance(self.traffic, Routes) else (ramp.net,)
+        held = hashlib.sha256(f"{self.first} {self.last}".encode())
+        for file in files:
+            held.update(file.read_bytes())
+        return held.hexdigest()[:16]
+
+    def worlds(
+        self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
+    ) -> Iterator[AbstractContextManager[Opened]]:
+        """See `Cases`; one world per scene."""
+        worker_session.close()
+        for number in range(len(self)):
+            yield self.part(number, number + 1)._opened(ramp, seed, options)
+
+    @contextmanager
+    def _opened(self, ramp: Ramp, seed: int, options: RunOptions) -> Iterator[Opened]:
+        with (
+            self.scene(ramp, seed) as scene,
+            scene.opened(options.gui_delay, options.extra, options.attach) as world,
+        ):
+
+            def facts(run: Run) -> Facts:
+                world.note_absent(scene.announced if options.attach is None else ())
+                run.effort.scene_s = world.time - world.begun_at
+                notes = [(str(event), line) for event, line in world.notes.lines]
+                return [{"scene": scene.name, "seed": scene.seed, **scene.facts(world), "notes": notes}]
+
+            yield Opened(world, scene.seed, facts)
+
+    @contextmanager
+    def scene(self, ramp: Ramp, seed: int) -> Iterator[Scene]:
+        """The first scene with its files, which are there as long as the context is."""
+        traffic = self.traffic
+        with tempfile.TemporaryDirectory(prefix="merge-cosim-") as folder:
+            announced: tuple[str, ...] = ()
+            if isinstance(traffic, Traffic):
+                file = write_traffic(Path(folder), traffic.demand, ramp)
+                end, warm_up = traffic.demand.duration, traffic.demand.warm_up
+            else:
+                file, warm_up = traffic.file, 0.0
+                configuration = Configuration.read(file)
+                end, announced = traffic.end or configuration.end, configuration.hosts(traffic.host)
+            yield Scene(
+                name=self.name(0),
+                file=file,
+                ramp=ramp,
+                seed=seed + traffic.seed + self.first,
+                end=end,
+                warm_up=warm_up,
+                host=traffic.host,
+                announced=announced,
+                attention=traffic.attention,
+            )

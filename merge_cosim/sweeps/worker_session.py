@@ -1,0 +1,34 @@
+"""What a worker process keeps from one chunk to the next: an open SUMO."""
+
+from __future__ import annotations
+
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.simulation.worlds.tiles import TiledWorld
+
+TILES = 192
+"""Encounters side by side in one SUMO. From 128 to 208 tiles a case costs the same: more of them spread the cost of a
+cycle's Python over more cars, but SUMO's own step costs more per car, as more cars fit its cache less well."""
+
+
+class WorkerSession:
+    """Keeps one tiled world open, as long as ramp and seed stay the same; libsumo holds one simulation per process."""
+
+    def __init__(self, tiles: int = TILES) -> None:
+        self._tiles = tiles
+        self._open: tuple[str, int, int] | None = None
+        self._world: TiledWorld | None = None
+
+    def world(self, ramp: Ramp, cases: int, seed: int) -> TiledWorld:
+        """A world on this ramp, with no more tiles than there are cases."""
+        tiles = min(self._tiles, cases)
+        wanted = (str(ramp.net), tiles, seed)
+        if self._world is None or self._open != wanted:
+            self.close()
+            self._world, self._open = TiledWorld(ramp, tiles, seed), wanted
+        return self._world
+
+    def close(self) -> None:
+        """End the simulation."""
+        if self._world is not None:
+            self._world.close()
+            self._world = None
