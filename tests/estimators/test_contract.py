@@ -6,6 +6,7 @@ import pytest
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import stream_keys
+from merge_cosim.core.registry import parameters
 from merge_cosim.estimators.base import estimators
 from merge_cosim.estimators.learned.model import IntentionModel
 
@@ -80,3 +81,11 @@ def test_controllers_do_not_depend_on_their_batch(name):
     order = np.random.default_rng(2).permutation(COUNT)
     np.testing.assert_array_equal(drive(order), whole[:, order])
     np.testing.assert_array_equal(drive(np.array([7])), whole[:, [7]])
+
+
+@pytest.mark.parametrize("name", controllers.names())
+def test_what_a_controller_takes_from_an_estimator_are_parameters_of_both(name):
+    for estimator in estimators.names():
+        taken = controllers[name]().taken_from(estimators[estimator]())
+        assert taken.keys() <= parameters(controllers[name]).keys()
+        assert taken.items() <= parameters(estimators[estimator]).items()
