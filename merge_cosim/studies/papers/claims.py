@@ -18,7 +18,7 @@ ALIKE = 0.6
 """Failure rates no further apart than this [points] are alike: those of the paper are 0.9 and 0.9, 1.2 and 1.8 %."""
 BEST_NODES = (52, 73)
 """Numbers of speed nodes between which the failures are said to be fewest."""
-HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be told"
+HOLDS, FAILS, OPEN = "holds", "does not hold", "undecided"
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Verdict:
     """Our verdict on a claim.
 
     Attributes:
-        word: `holds`, `does not hold` or `cannot be told`.
+        word: `holds`, `does not hold` or `undecided`.
         evidence: The figures that it rests on.
     """
 
@@ -167,7 +167,7 @@ def _published_tests(evidence: Evidence) -> list[str]:
 
 
 def _word(leads: Sequence[float]) -> str:
-    """Holds where every lead is positive, does not where one is negative, cannot be told where it is a tie."""
+    """Holds where every lead is positive, does not where one is negative, undecided where it is a tie."""
     return HOLDS if min(leads) > 0 else FAILS if min(leads) < 0 else OPEN
 
 
