@@ -70,5 +70,10 @@ def test_an_installed_entry_point(files):
 
 @pytest.mark.slow
 def test_a_study_from_python(files):
+    study = files / "study.py"
+    coarse = {name: float(step) for name, _, step in (value.partition("=") for value in COARSE)}
+    text, changed = re.subn(r"\bplugins=", f"settings={coarse!r}, plugins=", study.read_text(encoding="utf-8"))
+    assert changed == 1
+    study.write_text(text, encoding="utf-8")
     assert "cautious" in in_a_process(files, sys.executable, "study.py")
     assert (files / "out/study/report.html").is_file()

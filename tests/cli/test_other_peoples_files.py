@@ -69,7 +69,7 @@ def test_a_motorway_from_openstreetmap(tmp_path: Path) -> None:
         "--set",
         "encounters.host=veh_mw_passenger",
         "--set",
-        "encounters.end=200",
+        "encounters.end=120",
     )
     done = merge_cosim("sweep", *how, "--out", "out", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -78,7 +78,7 @@ def test_a_motorway_from_openstreetmap(tmp_path: Path) -> None:
     assert len(found) > 0
     assert found["case"].str.match(r"000/veh_mw\d+/veh\d+").all()
     (scene,) = table(tmp_path / "out" / "scenes.csv")
-    assert float(scene["simulated_s"]) == 200.0
+    assert float(scene["simulated_s"]) == 120.0
 
 
 def test_a_configuration_of_everything(tmp_path: Path) -> None:

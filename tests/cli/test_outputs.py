@@ -113,7 +113,7 @@ def test_fcd_is_the_trace_on_the_designed_ramp_and_sumos_tool_draws_it(tmp_path)
 
 
 SCENE = """
-title = "A minute and a half of traffic"
+title = "A minute of traffic"
 ramp = "us101"
 
 [encounters]
@@ -121,7 +121,7 @@ kind = "traffic"
 replications = 1
 
 [encounters.demand]
-duration = 90
+duration = 60
 warm_up = 10
 through = 3000
 merging = 600

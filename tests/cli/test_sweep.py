@@ -142,7 +142,7 @@ def interrupt(tmp_path, sent, *arguments, once="*.parquet"):
     return running.returncode, error
 
 
-LONG = ("designed-random", "--set", "encounters.count=3000")
+LONG = ("designed-random", "--set", "encounters.count=2000")
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bytes(tmp_path, sent, unbroken
     assert ("--resume" in error) == (sent == signal.SIGINT)
     assert "Traceback" not in error
     kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")}
-    assert 0 < len(kept) < 6
+    assert 0 < len(kept) < 4
     if sent == signal.SIGKILL:
         refused_without_leave(tmp_path, arguments)
     assert {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("out/parts/*.parquet")} == kept
