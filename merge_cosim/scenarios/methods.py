@@ -196,3 +196,17 @@ def methods_for(encounters: Encounters, methods: Iterable[Method]) -> list[Metho
         for method in methods
         if (labelled or not method.needs_label) and (encounters.log is not None or not method.is_human)
     ]
+
+
+def refuse_unused(settings: Mapping[str, Any], methods: Iterable[Method]) -> None:
+    """Refuse parameters that no method has.
+
+    Raises:
+        UserError: There is one.
+    """
+    known = {key for method in methods for key in method.parameters()}
+    for name in settings:
+        if name not in known:
+            others = sorted(key for key in known if key.partition(".")[2] == name.partition(".")[2])
+            hint = f"set {' or '.join(others)}" if others else "leave it out"
+            raise UserError(f"{name}: no chosen method has this parameter; {hint}, or choose another method")

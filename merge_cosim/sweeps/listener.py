@@ -15,7 +15,7 @@ from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.merging_cars.sumo import BySumo
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.rows import result_rows
-from merge_cosim.scenarios.methods import Method
+from merge_cosim.scenarios.methods import Method, refuse_unused
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.meetings import DEFAULT_ATTENTION, Attention
@@ -71,6 +71,7 @@ class HostListener(StepListener):  # type: ignore[misc]
         """
         self._session, self._ramp, self._rules = Session(api), Ramp.load(ramp), rules or Rules()
         self._method = Method.of(method, settings)
+        refuse_unused(settings or {}, [self._method])
         if self._method.is_human or self._method.needs_label:
             raise UserError(f"{method}: it rests on a log and cannot drive in living traffic")
         self._model = IntentionModel.load(model or default_model(TRAFFIC)) if self._method.needs_model else None

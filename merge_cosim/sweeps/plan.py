@@ -25,6 +25,7 @@ from merge_cosim.scenarios.methods import (
     MethodSpec,
     default_methods,
     methods_for,
+    refuse_unused,
 )
 from merge_cosim.scenarios.scenario import Scenario, load_scenario
 from merge_cosim.scenarios.settings import split_settings
@@ -100,7 +101,7 @@ def plan(request: SweepRequest) -> list[Task]:
             own = [part for method in _methods(request.methods, {}) for part in method.objects if part is not None]
             of_scenario, of_components = split_settings(settings, own)
             methods = _methods(request.methods, of_components)
-            _refuse_unused(of_components, methods)
+            refuse_unused(of_components, methods)
             if varied in of_components:
                 methods = [method for method in methods if varied in method.parameters()]
             for scenario, given in _scenarios(request.scenarios, of_scenario, varied):
@@ -159,16 +160,6 @@ def _methods(specs: Sequence[MethodSpec], settings: dict[str, Any]) -> list[Meth
         if made.setdefault(method.name, method) != method:
             raise UserError(f"two methods are called '{method.name}'; give the object of one another `name`")
     return list(made.values())
-
-
-def _refuse_unused(settings: dict[str, Any], methods: Sequence[Method]) -> None:
-    """Refuse parameters that no method has."""
-    known = {key for method in methods for key in method.parameters()}
-    for name in settings:
-        if name not in known:
-            others = sorted(key for key in known if key.partition(".")[2] == name.partition(".")[2])
-            hint = f"set {' or '.join(others)}" if others else "leave it out"
-            raise UserError(f"{name}: no method of this sweep has this parameter; {hint}, or add --method")
 
 
 def _traffic_tasks(scenario: Scenario, variation: str, methods: list[Method], request: SweepRequest) -> Iterator[Task]:

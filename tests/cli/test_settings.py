@@ -12,10 +12,10 @@ import merge_cosim as package
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (("--method", "pgm+lqr", "--set", "acc.headway=4"), "acc.headway: no method of this sweep has this parameter"),
-        (("--method", "acc+lqr", "--set", "acc.headway=4"), "set lqr.headway, or add --method"),
-        (("--method", "pgm", "--vary", "lqr.q_gap=1,2"), "lqr.q_gap: no method of this sweep has this parameter"),
-        (("--method", "human", "--set", "acc.k_free=1"), "acc.k_free: no method of this sweep has this parameter"),
+        (("--method", "pgm+lqr", "--set", "acc.headway=4"), "acc.headway: no chosen method has this parameter"),
+        (("--method", "acc+lqr", "--set", "acc.headway=4"), "set lqr.headway, or choose another method"),
+        (("--method", "pgm", "--vary", "lqr.q_gap=1,2"), "lqr.q_gap: no chosen method has this parameter"),
+        (("--method", "human", "--set", "acc.k_free=1"), "acc.k_free: no chosen method has this parameter"),
         (("--method", "ipcb", "--set", "pcb.means=arrival"), "disagrees with ipcb.means = 'fixed'"),
         (("--set", "acc.headway=true"), "headway = True: Input should be a number"),
         (("--set", "acc.headway='1'"), "headway = '1': Input should be a number"),

@@ -210,7 +210,7 @@ SLIPS = (
         (("sweep", "small.toml", "--method", "acc+foo"), "unknown controller 'foo'"),
         (("sweep", "small.toml", "--set", "acc.headwy=1"), "did you mean 'headway'"),
         (("sweep", "small.toml", "--set", "acc.headway=x"), "headway = 'x'"),
-        (("sweep", "small.toml", "--method", "acc", "--set", "lqr.headway=1"), "no method of this sweep has"),
+        (("sweep", "small.toml", "--method", "acc", "--set", "lqr.headway=1"), "no chosen method has"),
         (("sweep", "small.toml", "./small.toml"), "another scenario is called 'small', too"),
         (("sweep", "small.toml", "--set", "test.horizn=1"), "small.toml: unknown key 'test.horizn'"),
         (("sweep", "small.toml", "--set", "speed_limit=nan"), "speed_limit"),

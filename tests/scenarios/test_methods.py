@@ -5,6 +5,7 @@ import pickle
 from dataclasses import dataclass
 
 import cloudpickle
+import libsumo
 import numpy as np
 import pytest
 
@@ -18,6 +19,7 @@ from merge_cosim.estimators.pgm import Pgm
 from merge_cosim.merging_cars.designed import Designed
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.settings import split_settings
+from merge_cosim.sweeps.listener import HostListener
 
 
 class LeadRule(Estimator):
@@ -173,3 +175,15 @@ def test_the_planner_takes_the_intended_accelerations_from_its_estimator():
 def test_a_planner_that_disagrees_with_its_estimator_is_refused(spec, settings):
     with pytest.raises(UserError, match=r"pcb\.means = .* disagrees with ipcb\.means = .*; set ipcb\.means"):
         Method.of(spec, settings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "line"),
+    [
+        ({"acc.headway": 1.0}, r"acc\.headway: no chosen method has this parameter; set lqr\.headway"),
+        ({"lqr.headwy": 1.0}, r"lqr\.headwy: no chosen method has this parameter"),
+    ],
+)
+def test_a_listener_refuses_settings_that_reach_nothing(settings, line):
+    with pytest.raises(UserError, match=line):
+        HostListener(libsumo, "designed", "acc+lqr", settings=settings)
