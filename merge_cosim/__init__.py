@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from merge_cosim.api.results import Results, load_results
     from merge_cosim.api.run import Run, run
     from merge_cosim.api.sweep import sweep
-    from merge_cosim.controllers.base import Controller
+    from merge_cosim.controllers.base import Controller, controller
     from merge_cosim.core.encounter import Encounters, Intention
     from merge_cosim.core.errors import UserError
     from merge_cosim.core.observation import Observation, Setting
-    from merge_cosim.estimators.base import Estimator
+    from merge_cosim.estimators.base import Estimator, estimator
     from merge_cosim.estimators.learned.model import IntentionModel
-    from merge_cosim.merging_cars.base import MergingCar
+    from merge_cosim.merging_cars.base import MergingCar, merging_car
     from merge_cosim.ramps.ramp import Ramp
     from merge_cosim.scenarios.scenario import Scenario, load_scenario
     from merge_cosim.sweeps.listener import HostListener
@@ -40,12 +40,15 @@ _HOME = {
     "Scenario": "scenarios.scenario",
     "Setting": "core.observation",
     "UserError": "core.errors",
+    "controller": "controllers.base",
+    "estimator": "estimators.base",
     "list_methods": "api.listing",
     "list_models": "api.listing",
     "list_ramps": "api.listing",
     "list_scenarios": "api.listing",
     "load_results": "api.results",
     "load_scenario": "scenarios.scenario",
+    "merging_car": "merging_cars.base",
     "run": "api.run",
     "sweep": "api.sweep",
 }
@@ -70,6 +73,9 @@ __all__ = [  # noqa: RUF022
     "Estimator",
     "Controller",
     "MergingCar",
+    "estimator",
+    "controller",
+    "merging_car",
     "Observation",
     "Setting",
     "HostListener",

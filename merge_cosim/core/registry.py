@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import importlib
 import importlib.util
 import inspect
@@ -24,6 +26,9 @@ from merge_cosim.core.errors import UserError
 
 LARGEST = 1e9
 """Largest number that a parameter can be: beyond it a sum in double precision is coarser than `units.TOLERANCE`."""
+
+PLUGIN = "merge_cosim_plugin_"
+"""What the name of a plugin file's module begins with."""
 
 C = TypeVar("C", bound="Component")
 
@@ -184,16 +189,16 @@ def meanings(cls: type) -> dict[str, str]:
     return {name: found.get(name, "") for name in parameters(cls)}
 
 
-def source_of(cls: type) -> str | None:
-    """The text of a class that is not of this package, or of the notebook cell it stands in; None if not to be had."""
-    if cls.__module__.partition(".")[0] == __package__.partition(".")[0]:
-        return None
+def source_of(cls: type) -> str:
+    """The text of a class, or of the notebook cell it stands in; a hash of its code where neither is to be had."""
     try:
         return inspect.getsource(cls)
     except (OSError, TypeError):  # a class of a notebook has no file
-        codes = (getattr(value, "__code__", None) for value in vars(cls).values())
-        cells = ("".join(linecache.getlines(code.co_filename)) for code in codes if code is not None)
-        return next(filter(None, cells), None)
+        codes = [value.__code__ for value in vars(cls).values() if hasattr(value, "__code__")]
+        written = dict.fromkeys(code.co_filename for code in codes if code.co_filename != dataclasses.__file__)
+        cells = ("".join(linecache.getlines(file)) for file in written)
+        held = hashlib.sha256(b"".join(code.co_code + repr(code.co_consts).encode() for code in codes))
+        return next(filter(None, cells), f"# no source at hand; hash of the code: {held.hexdigest()[:16]}")
 
 
 def validated(cls: type[C], values: Mapping[str, Any], where: str) -> C:
@@ -227,7 +232,7 @@ def load_plugin(file: Path) -> None:
     imported = (getattr(module, "__file__", None) for module in tuple(sys.modules.values()))
     if any(name and Path(name).resolve() == file.resolve() for name in imported):
         return
-    module_name = f"merge_cosim_plugin_{file.stem}"
+    module_name = f"{PLUGIN}{file.stem}"
     spec = importlib.util.spec_from_file_location(module_name, file)
     if spec is None or spec.loader is None:
         raise UserError(f"{file}: not a Python file")

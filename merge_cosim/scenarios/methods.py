@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 from merge_cosim.controllers.base import Controller, controllers
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.registry import Component, Registry, parameters, source_of, validated
+from merge_cosim.core.registry import Component, Registry, parameters, validated
 from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.simulation.host_driver import HostDriver
@@ -103,12 +103,10 @@ class Method:
         """Every parameter in effect, by `component.parameter`."""
         return dict(self.values)
 
-    def source(self) -> str | None:
-        """The text of those of its classes that are not of this package; None if there are none or it is not known."""
-        if self.is_human:
-            return None
-        classes = (part if isinstance(part, type) else type(part) for part in (self._estimator, self._controller))
-        return "\n\n".join(filter(None, map(source_of, classes))) or None
+    def classes(self) -> list[type[Component]]:
+        """The classes of its estimator and its controller; none of the logged host."""
+        parts = () if self.is_human else (self._estimator, self._controller)
+        return [part if isinstance(part, type) else type(part) for part in parts]
 
     def driver(self, model: IntentionModel | None) -> HostDriver:
         """Make the two parts anew; `model` goes to an estimator that needs one."""

@@ -21,7 +21,7 @@ from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue
 from merge_cosim.sweeps.executors import Finished, interrupts_ignored
 from merge_cosim.sweeps.identity import digest, digest_of, ramp_files, software
-from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.shipping import main_hidden, pack, unpack
 from merge_cosim.sweeps.worker_session import WorkerSession
 
 LOCAL = "local"
@@ -84,7 +84,7 @@ class Cluster:
                     if ramp not in worker_files_of:
                         worker_files_of[ramp] = self._worker_files(ramp)
                     key = f"merge-cosim-{session}-{chunk.name}"
-                    future = client.submit(run_shipped, chunk.task(), worker_files_of[ramp], key=key, pure=False)
+                    future = client.submit(run_shipped, pack(chunk.task()), worker_files_of[ramp], key=key, pure=False)
                     running[future] = chunk
                     done.add(future)
 
@@ -98,7 +98,7 @@ class Cluster:
     @contextmanager
     def _client(self) -> Iterator[Any]:
         if self._address == LOCAL:
-            with interrupts_ignored():
+            with interrupts_ignored(), main_hidden():
                 cluster = self._distributed.LocalCluster(
                     n_workers=self._jobs,
                     threads_per_worker=1,
@@ -157,7 +157,7 @@ _workplace: WorkerSession | None = None
 _plugins_here: dict[str, str] = {}
 
 
-def run_shipped(task: Task, worker_files: WorkerFiles) -> tuple[pa.Table, Effort]:
+def run_shipped(packed: bytes, worker_files: WorkerFiles) -> tuple[pa.Table, Effort]:
     """What a Dask worker does with a chunk: check, unpack, run; its SUMO stays open for the next one.
 
     Raises:
@@ -173,6 +173,7 @@ def run_shipped(task: Task, worker_files: WorkerFiles) -> tuple[pa.Table, Effort
         ramp = _unpack("ramps", worker_files.ramp, worker_files.ramp_name)
         if _workplace is None:
             _workplace = WorkerSession()
+        task = unpack(packed)
         here = replace(task, scenario=task.scenario.model_copy(update={"ramp": str(ramp)}))
         return here.run(_workplace)
     finally:

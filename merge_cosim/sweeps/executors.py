@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import pickle
 import signal
 import threading
 import traceback
@@ -21,6 +22,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import load_plugin
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue
+from merge_cosim.sweeps.shipping import dumps, main_hidden, pack, unpack
 from merge_cosim.sweeps.worker_session import WorkerSession
 
 if TYPE_CHECKING:  # a worker process plans nothing, and need not import what planning needs
@@ -105,7 +107,7 @@ class Processes:
                     chunk = worker.chunk
                     assert chunk is not None
                     try:
-                        outcome = connection.recv()
+                        outcome = pickle.loads(connection.recv_bytes())
                     except (EOFError, OSError):
                         del workers[connection]
                         losses[chunk.name] += 1
@@ -139,15 +141,16 @@ class _Worker:
         self.process: Any = context.Process(  # type: ignore[attr-defined]
             target=_serve, args=(there, inherited, plugins), name="merge-cosim worker", daemon=True
         )
-        with interrupts_ignored():
+        with interrupts_ignored(), main_hidden():
             self.process.start()
         there.close()
 
     def begin(self, chunk: Chunk | None) -> None:
         self.chunk = chunk
         if chunk is not None:
+            packed = pack(chunk.task())
             with suppress(OSError):  # it is dead; reading from it will say so
-                self.connection.send(chunk.task())
+                self.connection.send_bytes(packed)
 
     def stop(self) -> None:
         """End the process: at once if it is at work, else by its own will."""
@@ -155,7 +158,7 @@ class _Worker:
             self.process.terminate()
         else:
             with suppress(OSError):
-                self.connection.send(None)
+                self.connection.send_bytes(b"")
         self.connection.close()
         self.process.join()
 
@@ -180,7 +183,7 @@ def interrupts_ignored() -> Iterator[None]:
 
 
 def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
-    """What a worker process does: run what comes through the pipe, until that is None or nobody is there any more."""
+    """What a worker process does: run what comes through the pipe, until that is empty or closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the employer decides what an interrupt means
     if inherited is not None:
         inherited.close()  # else the worker would never see that the employer has gone
@@ -188,15 +191,15 @@ def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Pa
     try:
         for plugin in plugins:
             load_plugin(plugin)
-        while (task := employer.recv()) is not None:
+        while packed := employer.recv_bytes():
             outcome: object
             try:
-                outcome = task.run(worker_session)
+                outcome = unpack(packed).run(worker_session)
             except Exception as error:
                 if not isinstance(error, UserError):  # the traceback, say of a user's own file, stays behind
                     error.add_note(f"In a worker process:\n{traceback.format_exc()}")
                 outcome = error
-            employer.send(outcome)
+            employer.send_bytes(dumps(outcome))  # an error's class may be one of the user's
     except (EOFError, OSError):  # the employer was killed
         pass
     finally:

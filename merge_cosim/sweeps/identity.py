@@ -14,6 +14,7 @@ import merge_cosim
 from merge_cosim.ramps.definition import FILE_NAME
 from merge_cosim.ramps.ramp import Ramp, find_ramp
 from merge_cosim.sweeps.plan import SweepRequest, method_names
+from merge_cosim.sweeps.shipping import sources
 from merge_cosim.sweeps.task import Task
 
 
@@ -31,7 +32,7 @@ def identity(request: SweepRequest, tasks: Sequence[Task]) -> dict[str, Any]:
             }
             for task in tasks
         },
-        "sources": {task.method.name: source for task in tasks if (source := task.method.source())},
+        "components": sources(tasks),
         "against": request.against,
         "settings": {key: str(value) for key, value in request.settings.items()},
         "variations": [[name, [str(value) for value in values]] for name, values in request.variations],

@@ -2,6 +2,7 @@
 
 import linecache
 import pickle
+import re
 from dataclasses import dataclass
 
 import cloudpickle
@@ -13,6 +14,7 @@ from merge_cosim.controllers.acc import Acc
 from merge_cosim.controllers.base import Controller
 from merge_cosim.controllers.pcb import Pcb
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import source_of
 from merge_cosim.estimators.base import Estimator
 from merge_cosim.estimators.ipcb import Ipcb
 from merge_cosim.estimators.pgm import Pgm
@@ -110,14 +112,17 @@ def test_an_object_may_have_a_name_of_its_own():
     assert split_settings({"firm.braking": -3.0}, [given]) == ({}, {"firm.braking": -3.0})
 
 
-def test_the_source_of_what_is_not_of_the_package():
-    assert Method.of("pgm").source() is None
-    assert Method.of((LeadRule, Gentle)).source().count("class ") == 2
+def test_classes_and_their_source():
+    assert Method.of("human").classes() == []
+    assert Method.of("pgm").classes() == [Pgm, Acc]
+    assert [source_of(one).count("class ") for one in Method.of((LeadRule, Gentle)).classes()] == [1, 1]
     cell = "import numpy as np\n\nclass InACell(Estimator):\n    def update(self, seen):\n        return np.zeros(1)\n"
     linecache.cache["<cell 1>"] = (len(cell), None, cell.splitlines(keepends=True), "<cell 1>")
     scope = {"Estimator": Estimator, "__name__": "__main__"}
     exec(compile(cell, "<cell 1>", "exec"), scope)
-    assert "class InACell(Estimator)" in Method.of(scope["InACell"]).source()
+    assert "class InACell(Estimator)" in source_of(scope["InACell"])
+    del linecache.cache["<cell 1>"]
+    assert re.fullmatch("# no source at hand; hash of the code: [0-9a-f]{16}", source_of(scope["InACell"]))
 
 
 class Acceleration(Acc):

@@ -47,8 +47,8 @@ def test_a_sweep_of_objects(tmp_path: Path) -> None:
     assert manifest["parameters"]["short"]["short.lead"] == 0.0
     assert manifest["parameters"]["long"]["long.lead"] == 30.0
     assert manifest["parameters"]["lead-rule+lqr"]["lqr.headway"] == 1.5
-    assert set(manifest["sources"]) == {"short", "long", "lead-rule+lqr"}
-    assert "class LeadRule(Estimator)" in manifest["sources"]["long"]
+    assert set(manifest["components"]) == {"lead-rule"}
+    assert "class LeadRule(Estimator)" in manifest["components"]["lead-rule"]
 
 
 def test_what_cannot_be_told_apart_or_reached_is_refused() -> None:

@@ -147,8 +147,9 @@ def test_other_versions_are_refused():
     from merge_cosim.sweeps.dask_executor import WorkerFiles, run_shipped
     from merge_cosim.sweeps.identity import software
     from merge_cosim.sweeps.plan import SweepRequest, plan
+    from merge_cosim.sweeps.shipping import pack
 
     batch = next(cut(plan(SweepRequest(["designed-random"], ["acc"])))).task()
     worker_files = WorkerFiles(software() | {"libsumo": "0.1"}, {}, "designed", {})
     with pytest.raises(UserError, match=r"libsumo .* instead of 0\.1"):
-        run_shipped(batch, worker_files)
+        run_shipped(pack(batch), worker_files)
