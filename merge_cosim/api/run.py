@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +17,8 @@ from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.sumo.attach import Address
 from merge_cosim.sumo.outputs import SumoOutputs
-from merge_cosim.sweeps.single import NO_OUTPUTS, run_single
+from merge_cosim.sweeps.plan import plan
+from merge_cosim.sweeps.single import NO_OUTPUTS, case_alone, trace_case
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -116,10 +116,7 @@ def run(
     if trace is not None and Path(trace).suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: a trace is written as .csv or .parquet")
     address = Address.parse(attach) if attach else None
-    with tempfile.TemporaryDirectory(prefix="merge-cosim-") as folder:
-        file = Path(folder) / "trace.parquet"
-        row = run_single(request, case, delay if gui else None, file, outputs, address)
-        record = pd.read_parquet(file)
+    row, record = trace_case(case_alone(plan(request), case), case, delay if gui else None, outputs, address)
     if trace is not None:
         Path(trace).parent.mkdir(parents=True, exist_ok=True)
         if Path(trace).suffix == ".csv":

@@ -25,43 +25,6 @@ from merge_cosim.sweeps.worker_session import WorkerSession
 NO_OUTPUTS = SumoOutputs()
 
 
-def run_single(
-    request: SweepRequest,
-    case: str,
-    gui_delay: int | None = None,
-    trace: Path | None = None,
-    outputs: SumoOutputs = NO_OUTPUTS,
-    attach: Address | None = None,
-) -> dict[str, Any]:
-    """Run one case of one scenario under one method; see `trace_case`.
-
-    Args:
-        request: Names one scenario and one method.
-        case: Name of the case.
-        gui_delay: Milliseconds per step in sumo-gui; None runs without a window.
-        trace: File for the cycle-by-cycle record (.csv or .parquet), or None.
-        outputs: Files that SUMO is to write.
-        attach: Drive in the SUMO that listens there, instead of a new one.
-
-    Returns:
-        The result row; of a scene of living traffic its facts.
-
-    Raises:
-        UserError: There is no such case, or the trace's file name has another ending.
-        OSError: A file cannot be written.
-    """
-    if trace is not None and trace.suffix not in (".csv", ".parquet"):
-        raise UserError(f"{trace}: --trace writes .csv or .parquet")
-    row, record = trace_case(case_alone(plan(request), case), case, gui_delay, outputs, attach)
-    if trace is not None:
-        trace.parent.mkdir(parents=True, exist_ok=True)
-        if trace.suffix == ".csv":
-            record.to_csv(trace, index=False)
-        else:
-            record.to_parquet(trace, index=False)
-    return row
-
-
 def trace_case(
     task: Task,
     case: str,
