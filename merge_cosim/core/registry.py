@@ -210,7 +210,8 @@ def validated(cls: type[C], values: Mapping[str, Any], where: str) -> C:
         made: C = _adapter(cls).validate_python(dict(values))
     except ValidationError as error:
         first = error.errors()[0]
-        raise UserError(f"{where}: {'.'.join(map(str, first['loc']))} = {first['input']!r}: {first['msg']}") from None
+        place = f"{'.'.join(map(str, first['loc']))} = {first['input']!r}: " if first["loc"] else ""
+        raise UserError(f"{where}: {place}{first['msg'].removeprefix('Value error, ')}") from None
     for key, value in values.items():
         taken = getattr(made, key)
         if isinstance(value, bool | str) and type(taken) in (int, float):

@@ -101,6 +101,8 @@ class DbnPf(Estimator):
     def __post_init__(self) -> None:
         if self.start_yield + self.start_not_yield > 1.0 + TOLERANCE:
             raise ValueError("start_yield and start_not_yield are more than 1 together")
+        if self.min_acceleration > self.max_acceleration:
+            raise ValueError("min_acceleration is above max_acceleration")
 
     @property
     def start_belief(self) -> FloatArray:

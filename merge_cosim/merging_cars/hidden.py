@@ -84,6 +84,13 @@ class Hidden(DistanceKeeping, MergingCar):
     min_acceleration: NegativeFloat = -4.0
     max_acceleration: PositiveFloat = 3.0
 
+    def __post_init__(self) -> None:
+        """Check what must fit together."""
+        if self.yield_share + self.not_yield_share > 1.0 + TOLERANCE:
+            raise ValueError("yield_share and not_yield_share are more than 1 together")
+        if self.min_margin > self.max_margin:
+            raise ValueError("min_margin is above max_margin")
+
     def script(self, encounters: Encounters) -> Script:
         """Draw what the drivers of some encounters will do; a case's script depends only on its name."""
         n = len(encounters)
