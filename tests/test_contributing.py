@@ -1,4 +1,4 @@
-"""CONTRIBUTING and the API reference name what there is: every package."""
+"""CONTRIBUTING and the API reference name what there is: every file, every package."""
 
 import re
 from pathlib import Path
@@ -6,6 +6,14 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "merge_cosim"
 PACKAGES = {folder.name for folder in PACKAGE.iterdir() if (folder / "__init__.py").exists()}
+
+
+def test_the_files_that_are_named_are_there():
+    for page in ("CONTRIBUTING.md", "docs/architecture.md"):
+        text = (ROOT / page).read_text(encoding="utf-8")
+        named = {name for name in re.findall(r"`([\w/]+\.py)`", text) if "/" in name}
+        assert len(named) > 10
+        assert [name for name in named if not ((PACKAGE / name).exists() or (ROOT / name).exists())] == []
 
 
 def test_every_package_is_described():
