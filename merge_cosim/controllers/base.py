@@ -1,4 +1,4 @@
-"""The role of a controller: from the decision to the host's acceleration."""
+"""The base class of controllers: from the decision to the host's acceleration."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from merge_cosim.estimators.base import Estimator
 
 
 class Controller(Component):
-    """Turns what is seen and believed into accelerations of the host; parameters are dataclass fields.
+    """Computes the host's acceleration from observation and log-odds; parameters are dataclass fields.
 
     Attributes:
         default_estimator: Estimator of the method that is made of a controller alone.

@@ -1,4 +1,4 @@
-"""Full braking, whatever is seen: the lower bound that shows why failure rates alone say little."""
+"""Full braking in every situation: a bound that shows why failure rates by themselves say little."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -53,7 +53,7 @@ class Lqr(Following):
 @controllers.register
 @dataclass(kw_only=True)
 class LqrDirect(Lqr):
-    """Algorithm 1 to the letter: NOT_YIELD always commands a deceleration (Dong, Dolan, Litkouhi, PGM-LQR).
+    """Algorithm 1 taken literally: NOT_YIELD always commands a deceleration (Dong, Dolan, Litkouhi, PGM-LQR).
 
     While the merging car is the target and not yet in the lane, the command is the smaller of lqr's and
     `-deceleration`, however far ahead it may be; once it is in the lane, lqr's. The algorithm does not say how hard

@@ -30,7 +30,7 @@ class Pcb(IntendedAcceleration, Acc):
     `C_I(a) = progress * mean((v_limit - v) / v_limit) + comfort * (a / comfort_scale)^2
     + closeness * max_t exp(-max(gap, 0) / gap_scale) + overlap * [overlap at some t]`,
 
-    t over the steps at which both stations are >= 0 and `gap` from bumper to bumper whoever leads, the command is
+    t over the steps at which both stations are >= 0 and `gap` from bumper to bumper, the command is
     `argmin_a sum_I P(I) C_I(a)`, P(I) from the log-odds. Once the merging car is in the lane the intention is over:
     then acc's law drives with the gains of this controller (`pcb.headway`, not `acc.headway`).
 

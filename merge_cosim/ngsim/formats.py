@@ -1,4 +1,4 @@
-"""Telling trajectory files apart by their content: what a file holds, which columns, and how to open it."""
+"""Recognising trajectory files by their content: what a file holds, which columns, and how to open it."""
 
 import csv
 import gzip

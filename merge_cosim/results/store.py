@@ -93,7 +93,7 @@ class ResultFolder:
         return {file.stem for file in self._parts.glob("*.parquet") if _is_whole(file)}
 
     def add(self, name: str, rows: pa.Table) -> None:
-        """Store one batch's rows; after this they survive anything."""
+        """Store one batch's rows; from then on they are on the disk."""
         _write_table(self._parts / f"{name}.parquet", rows)
 
     def merge(self, more: Callable[[pa.Table], pa.Table] | None = None) -> None:
@@ -170,7 +170,7 @@ class ResultFolder:
         return pq.read_table(self.path / RESULTS, columns=columns, filters=which)
 
     def write_traces(self, records: pa.Table) -> None:
-        """Write the cycle-by-cycle records of the telling cases."""
+        """Write the cycle-by-cycle records of the illustrative cases."""
         _write_table(self.path / TRACES, records)
 
     def traces(self) -> pa.Table:

@@ -1,4 +1,4 @@
-"""What there is: every registered component with its parameters."""
+"""Lists of all registered components with their parameters."""
 
 import inspect
 from collections.abc import Iterator, Sequence

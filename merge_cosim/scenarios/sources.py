@@ -119,7 +119,7 @@ class Random(Strict):
 
 
 class Table(Strict):
-    """Initial states of one's own: a row per case, with the columns of `Encounters.from_frame`.
+    """Initial states given by the user: a row per case, with the columns of `Encounters.from_frame`.
 
     Attributes:
         file: CSV or Parquet file; None where a Python program hands the encounters over.
@@ -226,5 +226,5 @@ class Traffic(Strict):
 
     @property
     def host(self) -> str:
-        """All hosts say so."""
+        """No host is named: the types of all hosts carry the role."""
         return ""

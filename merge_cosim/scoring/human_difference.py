@@ -1,4 +1,4 @@
-"""How far a host is from the human who was logged in its place."""
+"""Difference of a host to the logged host of its encounter."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from merge_cosim.scoring.tracks import Tracks
 
 
 def human_difference(tracks: Tracks, log: ReplayLog | None) -> dict[str, FloatArray]:
-    """Squared differences to the logged host [m^2, m^2/s^2], summed while his log lasts; zero without a log."""
+    """Squared differences to the logged host [m^2, m^2/s^2], summed while its log lasts; zero without a log."""
     sums = {"station_square_sum": tracks.fill(0.0), "speed_square_sum": tracks.fill(0.0)}
     if log is None:
         return sums

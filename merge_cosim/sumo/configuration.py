@@ -1,4 +1,4 @@
-"""A SUMO configuration, as SUMO itself reads it: its net, its route files, who is in them."""
+"""A SUMO configuration, as SUMO itself reads it: its net, its route files, the vehicles in them."""
 
 from __future__ import annotations
 

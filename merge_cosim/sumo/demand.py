@@ -26,10 +26,11 @@ HOST_LENGTH = 4.7
 
 @dataclass(frozen=True)
 class Demand:
-    """Who drives in a scene, and by which of SUMO's models.
+    """The traffic of a scene: how many cars, and SUMO's models.
 
     Cars come at random intervals (exponential), those of the on-ramp at even ones, as behind a ramp meter. A wave is a
-    speed sign over the main road past the ramp: it slows everybody there now and then, and stop-and-go runs upstream.
+    speed sign over the main road past the ramp: it slows all cars there at intervals, and stop-and-go waves run
+    upstream.
 
     Attributes:
         duration: Length of a scene [s].
@@ -43,7 +44,7 @@ class Demand:
         imperfection: `sigma` of Krauss, of EIDM the same; IDM has none.
         speed_deviation: Deviation of the drivers' desired speeds, as a share of the limit.
         cooperative: How willing drivers are to make room, 0 to 1 (`lcCooperative`).
-        assertive: How small a gap a driver takes when he must change lane (`lcAssertive`).
+        assertive: How small a gap a driver accepts for a necessary lane change (`lcAssertive`).
         ramp_speed: Speed limit of the on-ramp [m/s]; 0 for that of the net.
         wave_every: Time from one wave to the next [s]; 0 for none.
         wave_lasts: How long a wave's sign is on [s].

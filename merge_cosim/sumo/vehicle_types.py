@@ -43,7 +43,7 @@ class VehicleType:
         sigma: Imperfection of the driver, 0 to 1.
         speed_deviation: Deviation of the desired speed, as a share of the limit.
         speed_factor: Distribution of desired speeds as a factor of the limit, in SUMO's words.
-        assertive: How small a gap a driver takes who must change lane (`lcAssertive`).
+        assertive: How small a gap a driver accepts for a necessary lane change (`lcAssertive`).
         strategic: How early the driver wants to change (`lcStrategic`).
         cooperative: How willing the driver is to make room (`lcCooperative`), 0 to 1.
         speed_gain: How eager the driver is to change for a faster lane (`lcSpeedGain`).

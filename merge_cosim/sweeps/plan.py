@@ -1,4 +1,4 @@
-"""From what the user asked for to what there is to run: one task per (scenario, variation, method)."""
+"""From the user's request to tasks, one per (scenario, variation, method)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Statistics over result rows: summaries with intervals, comparisons on the same cases, and how good beliefs are."""
+"""Statistics over result rows: summaries with intervals, comparisons on the same cases, and the quality of beliefs."""
 
 from merge_cosim.results.statistics.belief import belief, calibration
 from merge_cosim.results.statistics.summary import oracle_best, strata, summarise

@@ -1,4 +1,4 @@
-"""How good the beliefs were at fixed distances of the merging car, in closed loop: accuracy, AUC, Brier, log loss."""
+"""Quality of the beliefs at fixed distances of the merging car, in closed loop: accuracy, AUC, Brier, log loss."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Statistics over scenes: what became of the traffic as a whole under each method."""
+"""Statistics over scenes: measures of the traffic as a whole under each method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is in a scene: the hosts, and the cars that are yet to merge, as SUMO has them in every cycle."""
+"""The hosts and the cars that are yet to merge in a running SUMO, updated in every cycle."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Actors:
             self._enter(name)
 
     def update(self) -> None:
-        """Take in who came and who left in the last step, and where all are."""
+        """Take in which cars came and left in the last step, and the positions of all."""
         session, lanes = self._session, self._lanes
         for name in session.arrived():
             self.hosts.pop(name, None)
@@ -126,7 +126,7 @@ class Actors:
         self.came.add(name)
 
     def _drive(self, host: Actor, method: bool) -> None:
-        """Give the wheel to the method, or back to SUMO."""
+        """Let the method drive a host, or SUMO again."""
         host.driven = method
         if method:
             self._session.take_control(host.name)

@@ -1,4 +1,4 @@
-"""What can be chosen in full-scene replay."""
+"""The settings of full-scene replay."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -29,7 +29,7 @@ class LoggedTraffic:
 
     Attributes:
         released: Names of the cars that were handed to SUMO, in that order.
-        taken: Names of the cars that somebody else drives.
+        taken: Names of the cars that a method or the replay drives.
         blocked: Names of the cars that did not come in: a car off its log was too close, or is an earlier part of them.
     """
 
@@ -42,7 +42,7 @@ class LoggedTraffic:
             session: A running SUMO with the ramp's net.
             scene: The cars.
             ramp: The ramp of the scene's site.
-            drivers: Who drives released cars, as in the file that SUMO has loaded; None for the defaults.
+            drivers: The driver model of released cars, as in the file that SUMO has loaded; None for the defaults.
 
         Raises:
             UserError: A log leads off the net.
@@ -86,7 +86,7 @@ class LoggedTraffic:
         self._cycle = cycle
 
     def take_over(self, car: str) -> None:
-        """Drive a car no longer; it keeps its last command until somebody else gives it one.
+        """Drive a car no longer; it keeps its last command until it gets another.
 
         Raises:
             ValueError: It is not in the net on its log.

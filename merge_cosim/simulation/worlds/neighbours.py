@@ -1,4 +1,4 @@
-"""Who drives ahead of a host and behind it in its lane, when cars that follow a log may drive through it."""
+"""The cars ahead of a host and behind it in its lane, where cars that follow a log may drive through it."""
 
 from __future__ import annotations
 

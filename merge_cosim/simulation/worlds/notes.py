@@ -1,4 +1,4 @@
-"""What went on in a scene that its user should know of: each told in one line, and counted."""
+"""Events of a scene that the user should know of: one line each, and counted."""
 
 from __future__ import annotations
 

@@ -229,7 +229,7 @@ class TrafficWorld(World):
         return self._ended(still_open, age, back=0)
 
     def close(self) -> None:
-        """Leave SUMO to whoever started it."""
+        """Leave SUMO running; the caller that started it closes it."""
 
     def settled(self, track: FloatArray, point: float) -> FloatArray:
         """See `World`."""
@@ -356,7 +356,7 @@ class TrafficWorld(World):
             if host.lane is None or not first <= host.x <= last + attention.apart:
                 continue
             if host.is_on(Part.BESIDE):
-                line = f"host {host.name} drives beside the host lane, where it meets nobody"
+                line = f"host {host.name} drives beside the host lane, where it meets no merging car"
                 self.notes.add(Event.HOST_OFF_LANE, host.name, line)
             if host.driven:
                 for merging in waiting:
