@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from merge_cosim.api.listing import list_methods, list_models, list_ramps, list_scenarios
     from merge_cosim.api.results import Results, load_results
     from merge_cosim.api.run import Run, run
+    from merge_cosim.api.studies import Training, bounds, export, reproduce, train
     from merge_cosim.api.sweep import sweep
     from merge_cosim.controllers.base import Controller, controller
     from merge_cosim.core.encounter import Encounters, Intention
@@ -39,9 +40,12 @@ _HOME = {
     "Run": "api.run",
     "Scenario": "scenarios.scenario",
     "Setting": "core.observation",
+    "Training": "api.studies",
     "UserError": "core.errors",
+    "bounds": "api.studies",
     "controller": "controllers.base",
     "estimator": "estimators.base",
+    "export": "api.studies",
     "list_methods": "api.listing",
     "list_models": "api.listing",
     "list_ramps": "api.listing",
@@ -49,22 +53,29 @@ _HOME = {
     "load_results": "api.results",
     "load_scenario": "scenarios.scenario",
     "merging_car": "merging_cars.base",
+    "reproduce": "api.studies",
     "run": "api.run",
     "sweep": "api.sweep",
+    "train": "api.studies",
 }
 """The module that each name is defined in."""
 
 __all__ = [  # noqa: RUF022
     "sweep",
     "run",
+    "train",
     "load_results",
     "load_scenario",
     "list_methods",
     "list_models",
     "list_ramps",
     "list_scenarios",
+    "bounds",
+    "export",
+    "reproduce",
     "Results",
     "Run",
+    "Training",
     "Ramp",
     "Scenario",
     "Encounters",

@@ -210,23 +210,21 @@ def export(
 
     With --commonroad: run the case and write it as a CommonRoad scenario, with the host as its planning problem.
     """
-    from merge_cosim.ngsim.data import find_data
+    from merge_cosim.api.studies import export as export_case
     from merge_cosim.scenarios.settings import parse_setting
-    from merge_cosim.sweeps.plan import SweepRequest
-    from merge_cosim.sweeps.single import export_case, export_commonroad
 
-    if method and not commonroad:
-        raise UserError("--method: only with --commonroad; the SUMO files of a case are the same under all methods")
-    request = SweepRequest(
-        scenarios=[scenario],
-        methods=[method or "acc"],
+    file = export_case(
+        scenario,
+        case,
+        out,
+        commonroad=commonroad,
+        method=method,
         model=model,
         settings=dict(map(parse_setting, set_ or ())),
-        data=find_data(data),
+        data=data,
         source=source,
         seed=seed,
     )
-    file = export_commonroad(request, case, out) if commonroad else export_case(request, case, out)
     if json:
         print_json({"commonroad" if commonroad else "sumocfg": str(file)})
     else:
@@ -244,10 +242,9 @@ def train(
     json: Json = False,
 ) -> None:
     """Learn speed transitions, times to arrival and the prior from one third of a site's pairs, and judge the rest."""
-    from merge_cosim.ngsim.data import find_data
-    from merge_cosim.studies.training import train as train_model
+    from merge_cosim.api.studies import train as train_model
 
-    report = train_model(site, find_data(data), source, split, seed, out)
+    report = train_model(out, site=site, data=data, source=source, split=split, seed=seed).report
     if json:
         print_json(report)
     else:

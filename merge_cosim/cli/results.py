@@ -1,7 +1,7 @@
 """`merge-cosim report`, `compare`, `reproduce`, `bounds` and `bench`: results and what is made from them."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,9 +18,9 @@ def report(
     json: Json = False,
 ) -> None:
     """Make one offline HTML page of a sweep: tables, failure maps, one case in detail."""
-    from merge_cosim.report.page import write_report
+    from merge_cosim.api.results import Results
 
-    file = write_report(folder, against)
+    file = Results(folder).report(against=against)
     if json:
         print_json({"report": str(file)})
     else:
@@ -59,21 +59,13 @@ def reproduce(
     json: Json = False,
 ) -> None:
     """Run every table and figure of the papers, ours beside theirs, into one HTML page; a second call goes on."""
-    import os
-
-    from merge_cosim.api.progress import sweep_progress
+    from merge_cosim.api.studies import reproduce as run_studies
     from merge_cosim.cli.interrupts import resumable
-    from merge_cosim.ngsim.data import find_data
-    from merge_cosim.studies.papers.page import write_reproduction
-    from merge_cosim.studies.reproduction import reproduce as run_studies
 
-    found = find_data(data)
-    how = f"what was finished is kept in {out}; the same command goes on"
-    with resumable(how), sweep_progress() as progress:
-        studies = run_studies(found, out, jobs or os.cpu_count() or 1, seed, progress)
-        file = write_reproduction(studies, out, progress)
+    with resumable(f"what was finished is kept in {out}; the same command goes on"):
+        file, studies = run_studies(out, data=data, jobs=jobs, seed=seed)
     if json:
-        print_json({"report": str(file), "studies": {study.name: str(out / study.name) for study in studies}})
+        print_json({"report": str(file), "studies": {name: str(study.path) for name, study in studies.items()}})
     else:
         typer.echo(file)
 
@@ -88,11 +80,11 @@ def bounds(
     json: Json = False,
 ) -> None:
     """Count the cases of a replay that no host could pass without a failure, or not without a long delay."""
-    from merge_cosim.ngsim.data import find_data
+    from merge_cosim.api.studies import bounds as bounds_of
     from merge_cosim.scenarios.settings import parse_setting
-    from merge_cosim.studies.bounds import bounds_of
 
-    cases, rows = bounds_of(scenario, dict(map(parse_setting, set_ or ())), find_data(data), source)
+    cases, counts = bounds_of(scenario, settings=dict(map(parse_setting, set_ or ())), data=data, source=source)
+    rows: list[dict[str, Any]] = counts.to_dict("records")  # type: ignore[assignment]
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
         cases.to_csv(out, index=False)
