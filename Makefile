@@ -4,14 +4,17 @@ VENV := .venv
 DEMO := acc slot pgm always-go always-yield always-brake oracle-best
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs clean
+.PHONY: demo test coverage lint docs clean
 
 demo: $(VENV)/installed
 	$(BIN)/merge-cosim sweep designed-2 $(DEMO:%=--method %) --out out/demo
 	$(BIN)/merge-cosim report out/demo
 
 test: $(VENV)/installed
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal
+
+coverage: $(VENV)/installed
+	$(BIN)/pytest -n auto --dist worksteal --cov=merge_cosim --cov-branch --cov-report=term:skip-covered
 
 lint: $(VENV)/installed
 	$(BIN)/ruff check .

@@ -53,5 +53,5 @@ def _numbers(frame: pd.DataFrame, name: str) -> FloatArray:
         row = int(np.argmax(wrong))
         wanted = "a positive number" if name in POSITIVE else "a number"
         wanted += ", 0 or more" if name in NOT_NEGATIVE else ""
-        raise UserError(f"column '{name}', row {row}: {frame[name].iloc[row]!r} must be {wanted}")
+        raise UserError(f"column '{name}', row {row}: {frame[name].tolist()[row]!r} must be {wanted}")
     return values

@@ -6,6 +6,9 @@ import pytest
 from command import merge_cosim
 
 from merge_cosim.bench import loops
+from merge_cosim.bench.bench import machine
+from merge_cosim.bench.scaling import scaling
+from merge_cosim.bench.scenes import MODELS
 from merge_cosim.bench.updates import estimator_costs
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.base import estimators
@@ -40,9 +43,10 @@ def test_every_figure_is_there_and_on_the_page(tmp_path):
     assert [(row["cases"], row["processes"]) for row in found["scaling"]] == [
         (cases, jobs) for cases in (1, 9) for jobs in (1, 2)
     ]
-    assert [row["model"] for row in found["scenes"]] == ["Krauss", "IDM", "EIDM"]
+    assert [row["model"] for row in found["scenes"]] == list(MODELS)
     assert all(row["real_time_factor"] > 0 and row["meetings"] > 0 for row in found["scenes"])
     assert all(row["peak_mib"] > 50 for row in found["scaling"])
+    assert found["machine"]["processor"] == machine()["processor"]
     page = (tmp_path / "bench.md").read_text()
     alone, both = found["scaling"][-2:]
     gain = f"Over 9 cases 2 processes are {alone['run_s'] / both['run_s']:.2f} times as fast as 1 by `run_s`"
@@ -61,6 +65,11 @@ def test_outcomes_are_compared_case_by_case(monkeypatch):
     monkeypatch.setattr(loops, "_run_script", one_wrong)
     with pytest.raises(UserError, match=r"scalar\.py finds other failures than ours"):
         loops.compare(200, 20, 1)
+
+
+def test_a_sweep_that_fails_ends_the_bench():
+    with pytest.raises(UserError, match="bench: a sweep of 0 cases failed: merge-cosim: "):
+        scaling([0], [1], 1)
 
 
 def test_the_sample_holds_failures(tmp_path):

@@ -18,6 +18,7 @@ from running import Running
 from scene_files import ROUTES, own_files, small_scene
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.sumo.listener import StepListener
 from merge_cosim.sweeps.listener import HostListener
 
 
@@ -246,6 +247,8 @@ def test_the_script_of_the_page_finds_the_same_meetings(short, module):
 def test_a_listener_refuses_other_conditions(minute, step, several, ramp, expected):
     folder, _, _ = minute
     scene = str(folder / "files/traffic.sumocfg")
+
+    assert issubclass(HostListener, StepListener)  # SUMO takes no other
 
     def drive():
         number = libsumo.addStepListener(HostListener(libsumo, ramp, "acc"))

@@ -10,9 +10,12 @@ import pandas as pd
 import pytest
 import results_page
 
+from merge_cosim.core.errors import UserError
+from merge_cosim.ngsim.sites import site
+from merge_cosim.report.methods import looks
 from merge_cosim.report.published import published
 from merge_cosim.results.store import RESULTS
-from merge_cosim.studies.papers import claims, tables
+from merge_cosim.studies.papers import cases, claims, figures, tables
 from merge_cosim.studies.papers.evidence import Evidence, gather
 from merge_cosim.studies.papers.page import write_reproduction
 from merge_cosim.studies.reproduction import DESIGNED, NODE_SWEEP, PAIRS, Study, run, studies
@@ -105,6 +108,23 @@ def test_every_claim_gets_a_verdict_with_figures(evidence):
     assert len(table) == len(claims.CLAIMS)
     assert set(table["verdict"]) <= {claims.HOLDS, claims.FAILS, claims.OPEN}
     assert table["evidence"].str.contains(r"\d|no I-80").all()
+
+
+def test_the_case_of_fig_3_is_behind_and_faster(small):
+    case = cases.behind_but_accelerating(small[0])
+    assert case.start == "host -85 m at 20.0 m/s, merging car -90 m at 15.0 m/s"
+    assert set(case.failed) == set(cases.BEHIND_METHODS)
+    lowest = case.lowest_acceleration()
+    first = case.traces[(case.traces["method"] == "pgm") & (case.traces["host_station_m"] < 0)]
+    assert lowest["pgm"] == first["host_acceleration_m_s2"].min()
+
+
+def test_the_figure_of_nodes_has_a_line_per_method(evidence, tmp_path):
+    (axes,) = figures.node_figure(evidence, looks(["pgm"])).axes
+    (line,) = axes.lines
+    assert line.get_xdata().tolist() == [1, 52, 80]
+    with pytest.raises(UserError, match="no merging car of us101 in it"):
+        figures.overlap_figure(tmp_path, site("us101"))
 
 
 def _with_rates(evidence: Evidence, rates: dict[str, float]) -> Evidence:

@@ -6,6 +6,7 @@ from cases import random_encounters
 
 from merge_cosim.core.encounter import NEVER, Ragged, ReplayLog
 from merge_cosim.core.observation import Observation
+from merge_cosim.scoring.human_difference import human_difference
 from merge_cosim.scoring.rules import Rules, Watch, expected_cycles
 from merge_cosim.scoring.scoring import HOST_INTO_MERGING, MERGING_INTO_HOST, SIDE, score
 from merge_cosim.scoring.tracks import Tracks
@@ -195,6 +196,7 @@ def test_difference_to_the_logged_host_is_summed_while_his_log_lasts():
     found = score(tracks, Rules(), log)
     assert found["station_square_sum"][0] == pytest.approx(0.5**2 + 0.2**2)
     assert found["speed_square_sum"][0] == pytest.approx(5.0**2 + 3.0**2)
+    assert human_difference(tracks, None)["station_square_sum"].tolist() == [0.0]
 
 
 def test_encounters_are_scored_alike_alone_and_together():

@@ -16,6 +16,7 @@ from merge_cosim.ngsim.pairing.encounters import site_pairs
 from merge_cosim.ngsim.sites import Site, shipped_sites, site
 from merge_cosim.ngsim.surrogate.ngsim_format import ngsim_rows
 from merge_cosim.ngsim.surrogate.recipe import RECIPES
+from merge_cosim.ngsim.surrogate.sumo_run import COLUMNS, simulate
 from merge_cosim.ngsim.surrogate.surrogate import cached_surrogate, export, generate, surrogate_folder
 from merge_cosim.ramps.ramp import Ramp, read_net
 
@@ -104,6 +105,13 @@ def test_a_row_in_feet_by_hand(tmp_path: Path) -> None:
     assert rows[1]["Local_X"] == round((sum(widths[:4]) + widths[4] / 2 - 0.25) / FOOT, 3)
     assert rows[1]["v_Acc"] == 10.0
     assert rows[0]["segment"] == "surrogate_2"
+
+
+def test_a_run_is_recorded_from_the_warm_up_on(tmp_path: Path) -> None:
+    recipe = replace(SHORT["us101"], duration=2.0, warm_up=20.0)
+    run = pq.read_table(simulate(recipe, Ramp.load("us101"), 7, 600.0, tmp_path))
+    assert {f"vehicle_{name}" for name in COLUMNS} <= set(run.column_names)
+    assert sorted(set(run["timestep_time"].to_pylist())) == pytest.approx(20.0 + 0.1 * np.arange(20))
 
 
 def test_sumo_that_fails_is_told_in_one_line(tmp_path: Path) -> None:
