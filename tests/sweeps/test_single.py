@@ -5,7 +5,7 @@ import pytest
 from merge_cosim.core.errors import UserError
 from merge_cosim.results.store import ResultFolder
 from merge_cosim.sweeps.plan import SweepRequest, plan
-from merge_cosim.sweeps.single import case_alone, run_single, trace_methods
+from merge_cosim.sweeps.single import case_alone, trace_case, trace_methods
 from merge_cosim.sweeps.single_timing import SINGLE_CASES, time_single_cases
 from merge_cosim.sweeps.sweep import sweep
 
@@ -23,10 +23,8 @@ def test_a_case_is_found_by_its_name():
         case_alone(plan(request("acc")), "nosuch")
 
 
-def test_a_trace_goes_up_to_the_last_command(tmp_path):
-    with pytest.raises(UserError, match=r"x\.txt: --trace writes"):
-        run_single(request("acc"), CASE, trace=tmp_path / "x.txt")
-    row = run_single(request("acc"), CASE, trace=tmp_path / "new" / "x.parquet")
+def test_a_trace_goes_up_to_the_last_command():
+    row, _ = trace_case(case_alone(plan(request("acc")), CASE), CASE)
     traces, failed = trace_methods(request("acc", "always-go"), CASE)
     assert set(traces["method"]) == {"acc", "always-go"} == set(failed)
     assert failed["acc"] == row["failed"]
