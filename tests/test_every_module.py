@@ -1,6 +1,7 @@
 """Every module with code in it is imported by a test that names it, or holds a public name that one uses."""
 
 import ast
+from collections import Counter
 from pathlib import Path
 
 import merge_cosim
@@ -34,3 +35,9 @@ def named(file: Path) -> set[str]:
 def test_every_module_is_named_by_a_test():
     tests = set().union(*(named(file) for file in (ROOT / "tests").rglob("*.py")))
     assert sorted(modules() - tests) == [], "import these in a test of theirs"
+
+
+def test_no_two_test_files_have_one_name():
+    """Test folders are no packages, so that pytest cannot collect two files of one name."""
+    count = Counter(file.name for file in (ROOT / "tests").rglob("*.py") if file.name != "conftest.py")
+    assert [name for name, times in count.items() if times > 1] == []
