@@ -50,7 +50,9 @@ class Run:
         from merge_cosim.api.plots import case_figure
 
         if "method" not in self.row or "failed" not in self.row:
-            raise UserError("plot: this is a whole scene of living traffic; run one of its meetings")
+            raise UserError(
+                "plot: this is a whole scene of living traffic; run one of its encounters (SCENE/HOST/MERGING)"
+            )
         method = str(self.row["method"])
         return case_figure(self.trace.assign(method=method), {method: bool(self.row["failed"])}, quantity)
 

@@ -51,7 +51,9 @@ class Exported:
         done = merge_cosim("run", *self.arguments, "--trace", "trace.csv", "--fcd", "fcd.xml", "--json", cwd=folder)
         self.row = json.loads(done.stdout)
         with (folder / "trace.csv").open(newline="") as file:
-            self.trace = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+            self.trace = [
+                {name: float(value) for name, value in row.items() if name != "case"} for row in csv.DictReader(file)
+            ]
         self.scenario, problems = CommonRoadFileReader(str(self.file)).open()
         (self.problem,) = problems.planning_problem_dict.values()
         (self.car,) = self.scenario.dynamic_obstacles
