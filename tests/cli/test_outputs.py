@@ -57,7 +57,7 @@ def check_fcd(folder, ramp, merge_position, trace):
 def us101(tmp_path_factory):
     """The first case of the surrogate of US-101 under ACC: its folder, encounter, row and trace."""
     folder = tmp_path_factory.mktemp("us101")
-    cases = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].encounters
+    cases = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].cases.encounters
     arguments = ("us101-replay", "--source", "surrogate", "--case", cases.case[0], "--method", "acc")
     return folder, cases, *run_with_outputs(folder, *arguments)
 
@@ -239,7 +239,7 @@ def test_mistakes_get_one_line_and_status_2(tmp_path, arguments, expected):
 
 
 def test_the_logged_host_is_not_driven_in_sumo(tmp_path):
-    case = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].encounters.case[0]
+    case = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].cases.encounters.case[0]
     arguments = ("--source", "surrogate", "--case", case, "--method", "human", "--fcd", "x.xml")
     line = refused("run", "us101-replay", *arguments, cwd=tmp_path)
     assert line.startswith("merge-cosim: SUMO's outputs: the method 'human' is the log itself")
