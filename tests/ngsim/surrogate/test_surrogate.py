@@ -121,15 +121,12 @@ def test_sumo_that_fails_is_told_in_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "recordings"), [("us101", 3), ("i80", 1)])
-def test_there_are_as_many_pairs_as_published_of_both_kinds(name: str, recordings: int) -> None:
-    """All recordings of US-101, which other tests need, too; of I-80 one, which holds its third of the pairs."""
-    recipe = RECIPES[name]
-    first = replace(recipe, seeds=recipe.seeds[:recordings])
-    paired = site_pairs(cached_surrogate(first), site(name), source="surrogate")
+@sites
+def test_there_are_as_many_pairs_as_published_of_both_kinds(site: Site) -> None:
+    paired = site_pairs(surrogate_folder(site), site, source="surrogate")
     assert paired is not None
     encounters = paired.encounters
-    assert len(encounters) >= NUMBER_OF_PAIRS[name] * recordings / len(recipe.seeds)
+    assert len(encounters) >= NUMBER_OF_PAIRS[site.name]
     assert 0.35 < np.mean(encounters.label == Intention.YIELD) < 0.65
     assert not encounters.smoothed_source.any()
     assert set(encounters.source) == {"surrogate"}
