@@ -15,6 +15,7 @@ from merge_cosim.ngsim.data import find_data
 from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.scenarios.scenario import Scenario, scenario_of
+from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.sweeps.plan import ScenarioSpec, StartMethod, SweepRequest
 
 ScenarioLike: TypeAlias = str | Path | Scenario | Encounters
@@ -39,6 +40,7 @@ def request_of(
     jobs: int | None = None,
     start: StartMethod = "spawn",
     dask: str | None = None,
+    world: WorldKind = "sumo",
 ) -> SweepRequest:
     """Make a request; the arguments are those of `merge_cosim.sweep`.
 
@@ -59,6 +61,7 @@ def request_of(
         start=start,
         dask=dask,
         against=against,
+        world=world,
     )
 
 

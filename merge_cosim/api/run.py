@@ -15,6 +15,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.scenarios.methods import MethodSpec
+from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.sumo.attach import Address
 from merge_cosim.sumo.outputs import SumoOutputs
 from merge_cosim.sweeps.plan import plan
@@ -78,6 +79,7 @@ def run(
     source: SourceChoice | None = None,
     seed: int = 0,
     plugins: Sequence[str | Path] = (),
+    world: WorldKind = "sumo",
     gui: bool = False,
     delay: int = 100,
     trace: str | Path | None = None,
@@ -100,6 +102,7 @@ def run(
         source: As in `merge_cosim.sweep`.
         seed: As in `merge_cosim.sweep`.
         plugins: As in `merge_cosim.sweep`.
+        world: As in `merge_cosim.sweep`.
         gui: Show it in sumo-gui.
         delay: With `gui`: milliseconds per step; 100 is real time.
         trace: File to write the trace to (.csv or .parquet).
@@ -113,7 +116,15 @@ def run(
         UserError: There is no such scenario, case or method, or what is asked for does not fit.
     """
     request = request_of(
-        scenario, [method], model=model, settings=settings, data=data, source=source, seed=seed, plugins=plugins
+        scenario,
+        [method],
+        model=model,
+        settings=settings,
+        data=data,
+        source=source,
+        seed=seed,
+        plugins=plugins,
+        world=world,
     )
     if trace is not None and Path(trace).suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: a trace is written as .csv or .parquet")

@@ -18,6 +18,7 @@ from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ngsim.data import find_data
 from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.scenarios.methods import MethodSpec
+from merge_cosim.simulation.worlds.base import WorldKind
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,13 @@ def export(
 
 
 def reproduce(
-    out: str | Path, *, data: str | Path | None = None, jobs: int | None = None, seed: int = 0, progress: bool = True
+    out: str | Path,
+    *,
+    data: str | Path | None = None,
+    jobs: int | None = None,
+    seed: int = 0,
+    world: WorldKind = "sumo",
+    progress: bool = True,
 ) -> tuple[Path, dict[str, Results]]:
     """Run every table and figure of the papers, ours beside theirs, into one HTML page; a second call goes on.
 
@@ -154,6 +161,7 @@ def reproduce(
         data: As in `merge_cosim.sweep`.
         jobs: As in `merge_cosim.sweep`.
         seed: As in `merge_cosim.sweep`.
+        world: As in `merge_cosim.sweep`.
         progress: As in `merge_cosim.sweep`.
 
     Returns:
@@ -164,6 +172,6 @@ def reproduce(
 
     folder = find_data(None if data is None else Path(data))
     with sweep_progress(progress) as told:
-        studies = run_studies(folder, Path(out), jobs or os.cpu_count() or 1, seed, told)
+        studies = run_studies(folder, Path(out), jobs or os.cpu_count() or 1, seed, told, world)
         page = write_reproduction(studies, Path(out), told)
     return page, {study.name: Results(Path(out) / study.name) for study in studies}

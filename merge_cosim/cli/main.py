@@ -23,6 +23,7 @@ from merge_cosim.cli.options import (
     Scenario,
     Seed,
     Sets,
+    World,
     methods_like,
     scenarios_like,
 )
@@ -83,6 +84,7 @@ def sweep(
     data: Data = None,
     source: ForceSource = None,
     seed: Seed = 0,
+    world: World = "sumo",
     plugin: Plugins = None,
     against: Against = None,
     out: Annotated[Path, typer.Option(help="Result folder.")] = Path("out"),
@@ -114,6 +116,7 @@ def sweep(
             jobs=jobs,
             start=start,
             dask=dask,
+            world=world,
             out=out,
             resume=resume,
         )
@@ -122,7 +125,7 @@ def sweep(
         print_json({"summary": folder.read_json(SUMMARY_JSON), "manifest": results.manifest})
     else:
         rows = [{name: row[name] for name in SHOWN} for row in folder.read_json(SUMMARY_JSON)]
-        show_table(rows, f"{out}: {', '.join(scenarios)}")
+        show_table(rows, f"{out}: {', '.join(scenarios)} (world: {world})")
         if traffic := folder.traffic():
             shown = [name for name in SHOWN_TRAFFIC if name in traffic[0]]
             show_table([{name: row[name] for name in shown} for row in traffic], "the traffic as a whole")
@@ -148,6 +151,7 @@ def run(
     data: Data = None,
     source: ForceSource = None,
     seed: Seed = 0,
+    world: World = "sumo",
     plugin: Plugins = None,
     gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui.")] = False,
     delay: Annotated[int, typer.Option(min=0, help="With --gui: milliseconds per step; 100 is real time.")] = 100,
@@ -177,6 +181,7 @@ def run(
         source=source,
         seed=seed,
         plugins=plugin or (),
+        world=world,
         gui=gui,
         delay=delay,
         trace=trace,

@@ -50,4 +50,8 @@ Against = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Seed = Annotated[int, typer.Option(help="Seed of SUMO and of every random stream.")]
 ForceSource = Annotated[Source | None, typer.Option("--source", help="Force real data or the surrogate.")]
+World = Annotated[
+    Literal["sumo", "closed-form"],
+    typer.Option(help="What moves the cars: SUMO, or s' = s + v dt (many times faster; pairs only)."),
+]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")]

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Seed, Sets
+from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Seed, Sets, World
 from merge_cosim.cli.show import print_json, show_table
 
 app = typer.Typer()
@@ -56,6 +56,7 @@ def reproduce(
     out: Annotated[Path, typer.Option(help="Folder for results, models, tables and the page.")] = Path("reproduction"),
     jobs: Jobs = None,
     seed: Seed = 0,
+    world: World = "sumo",
     json: Json = False,
 ) -> None:
     """Run every table and figure of the papers, ours beside theirs, into one HTML page; a second call goes on."""
@@ -63,7 +64,7 @@ def reproduce(
     from merge_cosim.cli.interrupts import resumable
 
     with resumable(f"what was finished is kept in {out}; the same command goes on"):
-        file, studies = run_studies(out, data=data, jobs=jobs, seed=seed)
+        file, studies = run_studies(out, data=data, jobs=jobs, seed=seed, world=world)
     if json:
         print_json({"report": str(file), "studies": {name: str(study.path) for name, study in studies.items()}})
     else:

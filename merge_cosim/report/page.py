@@ -75,7 +75,7 @@ def write_report(folder: Path, against: str | None = None) -> Path:
     chapters = [_chapter(one, results, summary, traces, manifest, drawn) for one in tables.sections(summary)]
     varied = {f"{scenario}-{name}": (scenario, name) for scenario, name in tables.varied_parameters(summary)}
     variations = {key: _variation(summary, *pair, drawn) for key, pair in varied.items()}
-    contacts = collisions.collision_table(results)
+    contacts = collisions.collision_table(results) if len(tables.runs_in_sumo(results)) else None
     traffic = traffic_table(store.traffic())
     exported = {
         f"{c.section.scenario}-{c.section.site}-{c.section.source}-{name}": table
@@ -84,7 +84,7 @@ def write_report(folder: Path, against: str | None = None) -> Path:
     }
     exported |= {f"vary-{key}": table for key, (table, _) in variations.items()}
     exported |= {"traffic": traffic} if traffic else {}
-    write_tables(folder, exported | {"collisions": contacts})
+    write_tables(folder, exported | ({"collisions": contacts} if contacts else {}))
     file = folder / REPORT
     page = render(
         "report.html",
@@ -215,7 +215,8 @@ def _variation(
 
 
 def _head(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, str]:
-    simulated = tables.runs_in_sumo(results)
+    simulated = tables.simulated(results)
+    moved = {"sumo": "in SUMO", "closed-form": "in the closed form, without SUMO"}
     counted = results.groupby(["scenario", "source", "site"])["case"].nunique().reset_index()
     cases = [
         f"{n:,} {name} ({source if source == site else f'{source}, {site}'})"
@@ -227,7 +228,7 @@ def _head(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, str]:
     return {
         "Cases": "; ".join(cases),
         "Sources": "; ".join(f"{source}: {SOURCES.get(source, source)}" for source in sources),
-        "Runs": f"{len(simulated):,} in SUMO, under {simulated['method'].nunique()} methods",
+        "Runs": f"{len(simulated):,} {moved[manifest['world']]}, under {simulated['method'].nunique()} methods",
         "Methods": ", ".join(in_order(results["method"])),
         "Models": ", ".join(f"{name} ({digest})" for name, digest in manifest["models"].items()) or "none",
         "Set": settings or "nothing: all parameters at their defaults",
@@ -235,9 +236,14 @@ def _head(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, str]:
         "Seed": str(manifest["seed"]),
         "Versions": ", ".join(f"{name} {number}" for name, number in manifest["versions"].items()),
         "Wall time": f"{manifest['wall_s']:,.1f} s with {manifest['command']['jobs']} process(es)",
-        "Speed": f"{manifest['vehicle_steps_per_s'] or 0:,} vehicle-steps per second; "
-        f"{manifest['ratio_to_bare_sumo']} times the wall time of bare SUMO",
-        "SUMO's stations": f"at most {manifest['worst_station_difference_m']:.1e} m from the closed form"
-        if sources != [TRAFFIC]
-        else "the only ones: other cars have no closed form",
+        "Speed": f"{manifest['vehicle_steps_per_s'] or 0:,} vehicle-steps per second",
+        **(_of_sumo(manifest, sources) if manifest["world"] == "sumo" else {}),
+    }
+
+
+def _of_sumo(manifest: dict[str, Any], sources: list[str]) -> dict[str, str]:
+    apart = f"at most {manifest['worst_station_difference_m']:.1e} m from the closed form"
+    return {
+        "Wall time of the loop": f"{manifest['ratio_to_bare_sumo']} times that of bare SUMO",
+        "SUMO's stations": apart if sources != [TRAFFIC] else "the only ones: other cars have no closed form",
     }

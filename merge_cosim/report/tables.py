@@ -143,9 +143,14 @@ def varied_parameters(summary: pd.DataFrame) -> list[tuple[str, str]]:
     return list(dict.fromkeys((scenario, variation.partition("=")[0]) for scenario, variation in rows if variation))
 
 
-def runs_in_sumo(results: pd.DataFrame) -> pd.DataFrame:
+def simulated(results: pd.DataFrame) -> pd.DataFrame:
     """The rows that were simulated, without those picked from others or made from the log."""
     return results[~results["method"].isin((ORACLE_BEST, HUMAN))]
+
+
+def runs_in_sumo(results: pd.DataFrame) -> pd.DataFrame:
+    """Those of them that SUMO simulated."""
+    return simulated(results[results["world"] == "sumo"])
 
 
 def of_section(summary: pd.DataFrame, section: Section) -> pd.DataFrame:

@@ -19,7 +19,7 @@ from merge_cosim.scoring.tracks import Tracks
 from merge_cosim.simulation.host_driver import DriverBlocks, HostDriver
 from merge_cosim.simulation.leader import LeaderRule
 from merge_cosim.simulation.recording import Recorder, trace_of
-from merge_cosim.simulation.worlds.base import Ended, World
+from merge_cosim.simulation.worlds.base import Ended, World, WorldKind
 
 SCORED_TOGETHER = 128
 """Encounters that are over wait until so many can be scored in one go; their tracks then still fit the cache."""
@@ -73,7 +73,7 @@ class Run:
     encounters: Encounters
     columns: dict[str, AnyArray]
     effort: Effort
-    world: str
+    world: WorldKind
     traces: dict[str, pd.DataFrame] = field(default_factory=dict)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from merge_cosim.ngsim.pairing.encounters import site_encounters
 from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.scenarios.encounters import SourceChoice
+from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.studies.training import train
 from merge_cosim.sweeps.sweep import SweepRequest, sweep
 
@@ -42,7 +43,9 @@ class Study:
         return self.kind if self.kind == self.source else f"{self.kind}-{self.source}"
 
 
-def reproduce(data: Path | None, out: Path, jobs: int, seed: int = 0, say: Say | None = None) -> list[Study]:
+def reproduce(
+    data: Path | None, out: Path, jobs: int, seed: int = 0, say: Say | None = None, world: WorldKind = "sumo"
+) -> list[Study]:
     """Train a model per source, run every study into a folder of its own, and return the studies.
 
     Args:
@@ -51,8 +54,9 @@ def reproduce(data: Path | None, out: Path, jobs: int, seed: int = 0, say: Say |
         jobs: Processes.
         seed: Seed of SUMO and of every random stream.
         say: Told what is going on.
+        world: What moves the cars.
     """
-    found = studies(data, out, jobs, seed, say)
+    found = studies(data, out, jobs, seed, say, world)
     run(found, out, say)
     return found
 
@@ -68,9 +72,11 @@ def run(found: Sequence[Study], out: Path, say: Say | None = None) -> None:
         sweep(study.request, out / study.name, resume=True, progress=tell)
 
 
-def studies(data: Path | None, out: Path, jobs: int, seed: int, say: Say | None = None) -> list[Study]:
+def studies(
+    data: Path | None, out: Path, jobs: int, seed: int, say: Say | None = None, world: WorldKind = "sumo"
+) -> list[Study]:
     """The sweeps to run: those without data, then those on the surrogate and those on real pairs, each apart."""
-    base = SweepRequest((), data=data, jobs=jobs, seed=seed)
+    base = SweepRequest((), data=data, jobs=jobs, seed=seed, world=world)
     found = [Study(DESIGNED, DESIGNED, replace(base, scenarios=("designed-2", "designed-3")))]
     for source, sites in _sites(data).items():
         if say:

@@ -23,7 +23,7 @@ from merge_cosim.ramps.view import view_options
 from merge_cosim.scenarios.sources import Routes, Traffic
 from merge_cosim.scoring.rules import Rules, expected_cycles
 from merge_cosim.simulation.loop import Run
-from merge_cosim.simulation.worlds.base import World
+from merge_cosim.simulation.worlds.base import World, WorldKind
 from merge_cosim.simulation.worlds.logged import LoggedWorld, Place
 from merge_cosim.simulation.worlds.logged_host import LoggedHostWorld
 from merge_cosim.simulation.worlds.logged_rules import FullScene
@@ -84,9 +84,11 @@ class Cases(ABC):
     """Some cases of a scenario.
 
     Attributes:
+        world: What moves their cars, see `World.kind`.
         most: Most of them that are handed out at a time.
     """
 
+    world: ClassVar[WorldKind] = "sumo"
     most: ClassVar[int]
 
     @property
@@ -199,19 +201,20 @@ class PairCases(Cases):
         self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
     ) -> Iterator[Opened]:
         if human:
-            yield Opened(LoggedHostWorld(len(self)), seed, _no_facts)
+            yield Opened(LoggedHostWorld(len(self)), seed, no_facts)
         elif options == AS_IN_A_SWEEP:
-            yield Opened(worker_session.world(ramp, len(self), seed), seed, _no_facts)
+            yield Opened(worker_session.world(ramp, len(self), seed), seed, no_facts)
         else:
             worker_session.close()
             world = _single_world(ramp, seed, options)
             try:
-                yield Opened(world, seed, _no_facts)
+                yield Opened(world, seed, no_facts)
             finally:
                 world.close()
 
 
-def _no_facts(run: Run) -> Facts:
+def no_facts(run: Run) -> Facts:
+    """Of encounters of pairs."""
     return []
 
 

@@ -23,6 +23,7 @@ def identity(request: SweepRequest, tasks: Sequence[Task]) -> dict[str, Any]:
     models = {task.model.name: task.model for task in tasks if task.model}
     return {
         "versions": software(),
+        "world": request.world,
         "seed": request.seed,
         "methods": method_names(request, tasks),
         "parameters": {

@@ -30,11 +30,13 @@ from merge_cosim.scenarios.methods import (
 from merge_cosim.scenarios.scenario import Scenario, load_scenario
 from merge_cosim.scenarios.settings import split_settings
 from merge_cosim.scenarios.sources import Routes, Traffic
+from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
 from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.lane_map import LaneMap
 from merge_cosim.sumo.vehicle_types import ROLE
 from merge_cosim.sweeps.cases import LoggedCases, PairCases, TrafficCases
+from merge_cosim.sweeps.closed_form_cases import ClosedFormCases
 from merge_cosim.sweeps.task import Task
 
 StartMethod = Literal["spawn", "fork"]
@@ -60,6 +62,7 @@ class SweepRequest:
         start: How processes come to be, see `executors.Processes`.
         dask: Address of a Dask scheduler, or `local`; None for processes of this machine.
         against: Method that the others are compared with on the same cases; None for pgm, if it is there.
+        world: What moves the cars.
     """
 
     scenarios: Sequence[ScenarioSpec]
@@ -75,6 +78,7 @@ class SweepRequest:
     start: StartMethod = "spawn"
     dask: str | None = None
     against: str | None = None
+    world: WorldKind = "sumo"
 
 
 def plan(request: SweepRequest) -> list[Task]:
@@ -165,6 +169,8 @@ def _methods(specs: Sequence[MethodSpec], settings: dict[str, Any]) -> list[Meth
 def _traffic_tasks(scenario: Scenario, variation: str, methods: list[Method], request: SweepRequest) -> Iterator[Task]:
     traffic = scenario.encounters
     assert isinstance(traffic, (Routes, Traffic))
+    if request.world == "closed-form":
+        raise _needs_sumo(scenario, "traffic")
     if isinstance(traffic, Routes):
         if request.dask is not None:
             raise UserError(f"{traffic.file}: route files with traffic run on this machine; leave out --dask")
@@ -205,7 +211,7 @@ def _encounter_tasks(
     encounters, left_out = _on_the_ramp(scenario, encounters)
     for source in dict.fromkeys(encounters.source.tolist()):
         chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
-        cases = _cases(scenario, chosen, source, request.data)
+        cases = _cases(scenario, chosen, source, request)
         for method in methods_for(chosen, methods):
             model = _model(method, source, request)
             if model is not None:
@@ -221,14 +227,22 @@ def _encounter_tasks(
             )
 
 
-def _cases(scenario: Scenario, encounters: Encounters, source: str, data: Path | None) -> PairCases:
+def _cases(scenario: Scenario, encounters: Encounters, source: str, request: SweepRequest) -> PairCases:
     """The encounters alone, or among the cars that were logged with them."""
     if scenario.full_scene is None:
-        return PairCases(encounters)
+        return ClosedFormCases(encounters) if request.world == "closed-form" else PairCases(encounters)
+    if request.world == "closed-form":
+        raise _needs_sumo(scenario, "full_scene")
     try:
-        return LoggedCases.of(encounters, scenario.full_scene, load_scenes(scenario, source, data))
+        return LoggedCases.of(encounters, scenario.full_scene, load_scenes(scenario, source, request.data))
     except UserError as error:
         raise UserError(f"scenario {scenario.name}: {error}") from None
+
+
+def _needs_sumo(scenario: Scenario, why: str) -> UserError:
+    return UserError(
+        f"scenario {scenario.name}: {why} needs SUMO to move the other cars; leave out --world closed-form"
+    )
 
 
 def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:

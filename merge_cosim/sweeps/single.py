@@ -46,6 +46,8 @@ def trace_case(
     for name in (name for name, given in (asked | {"--attach": attach is not None}).items() if given):
         if task.method.is_human:
             raise UserError(f"{name}: the method 'human' is the log itself and is not driven in SUMO; leave one out")
+        if task.cases.world != "sumo":
+            raise UserError(f"{name}: not with --world {task.cases.world}, which runs without SUMO; leave one out")
     if gui_delay is not None and "DISPLAY" not in os.environ and sys.platform.startswith("linux"):
         raise UserError("--gui: there is no display (DISPLAY is not set); leave it out, or use xvfb-run")
     options, session = RunOptions(gui_delay, outputs.prepare(), attach), WorkerSession(tiles=1)

@@ -39,7 +39,15 @@ def test_a_contact_before_scoring_is_sumos_only(data_dir, tmp_path):
 
 
 def test_what_fits_neither_kind_is_named():
-    row = {"scenario": "s", "source": "designed", "case": "c", "method": "acc", "failed": True, "failure_kind": "side"}
+    row = {
+        "scenario": "s",
+        "world": "sumo",
+        "source": "designed",
+        "case": "c",
+        "method": "acc",
+        "failed": True,
+        "failure_kind": "side",
+    }
     times = {"host_reached_s": 3.0, "merging_reached_s": 3.2, "end_s": 4.0, "sumo_collision": False}
     rows = pd.DataFrame([row | times])
     assert kinds_of_difference(rows).tolist() == [UNEXPLAINED]

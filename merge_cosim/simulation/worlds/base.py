@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from merge_cosim.scoring.rules import Rules, expected_cycles
 
 if TYPE_CHECKING:
     from merge_cosim.simulation.leader import LeaderRule
+
+WorldKind: TypeAlias = Literal["sumo", "closed-form"]
+"""What moves the cars: SUMO, or `s' = s + v dt`."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ class World(ABC):
     One cycle is: `command`, `step`, `observe`, `ended`, `begin`.
 
     Attributes:
-        kind: What moves the cars: `sumo` or `closed-form`.
+        kind: What moves the cars.
         channels: What is recorded of each encounter and cycle beside both cars' states.
         slots: Number of slots; it may grow.
         step_s: Time [s] spent inside the steps of what moves the cars; commanding and reading is not in it.
@@ -76,7 +79,7 @@ class World(ABC):
         worst_difference_m: Largest difference of the stations from the closed form, at an encounter's end [m].
     """
 
-    kind: ClassVar[str] = "sumo"
+    kind: ClassVar[WorldKind] = "sumo"
     channels: ClassVar[tuple[str, ...]] = ()
     slots: int
     step_s: float = 0.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from merge_cosim.core.observation import DECIMALS
 from merge_cosim.core.units import DT, FloatArray, IntArray
-from merge_cosim.simulation.worlds.base import GivenWorld
+from merge_cosim.simulation.worlds.base import GivenWorld, WorldKind
 
 
 class ClosedForm:
@@ -30,7 +30,7 @@ class ClosedForm:
 class ClosedFormWorld(GivenWorld):
     """Moves one host and one merging car in each slot by the closed form."""
 
-    kind: ClassVar[str] = "closed-form"
+    kind: ClassVar[WorldKind] = "closed-form"
 
     def __init__(self, slots: int) -> None:
         super().__init__(slots)
