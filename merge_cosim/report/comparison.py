@@ -11,10 +11,11 @@ import pandas as pd
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.report.columns import Column, Table
-from merge_cosim.report.methods import in_order, is_reference
+from merge_cosim.report.methods import in_order
 from merge_cosim.results.statistics.comparison import mcnemar
 from merge_cosim.results.statistics.summary import is_sample
 from merge_cosim.results.store import MANIFEST, ResultFolder
+from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
 
 GROUP = ["scenario", "variation", "site", "source", "method"]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import pandas as pd
 
 from merge_cosim.report.columns import Column, Table
-from merge_cosim.report.methods import in_order, is_reference
+from merge_cosim.report.methods import in_order
 from merge_cosim.report.tables import METHOD, Section, of_section, ranges
 from merge_cosim.results.statistics import belief
 from merge_cosim.results.statistics.summary import ALL_STARTS
+from merge_cosim.scenarios.methods import is_reference
 
 SAFETY = (
     METHOD,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from merge_cosim.scenarios.methods import REFERENCES, is_reference
+
 FAMILIES = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg", "fg-gmm", "dbn-pf")
 """The papers' methods, in the order of their tables; a variant (`pgm-time`) follows its family."""
-REFERENCES = ("always-go", "always-yield", "always-brake", "oracle-label", "oracle-best", "human")
-"""What bounds the methods: no rivals of theirs, so they stand apart and in grey."""
 
 COLORS = {
     "acc": "#0072B2",
@@ -40,11 +40,6 @@ class Look:
 
     color: str
     line: str = "-"
-
-
-def is_reference(method: str) -> bool:
-    """Whether a method only bounds the others."""
-    return method.partition("+")[0] in REFERENCES
 
 
 def in_order(methods: Iterable[str]) -> list[str]:

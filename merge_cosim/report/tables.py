@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 
 from merge_cosim.report.columns import Column, Table
-from merge_cosim.report.methods import in_order, is_reference
+from merge_cosim.report.methods import in_order
 from merge_cosim.report.published import published
 from merge_cosim.results.statistics.summary import ALL_SITES, AMBIGUITY_EDGES, by_start
-from merge_cosim.scenarios.methods import HUMAN, ORACLE_BEST
+from merge_cosim.scenarios.methods import HUMAN, ORACLE_BEST, is_reference
 
 METHOD = Column("method", "method")
 MAIN = (

@@ -8,7 +8,8 @@ from typing import Any
 import pandas as pd
 
 from merge_cosim.report.columns import Column, Table
-from merge_cosim.report.methods import in_order, is_reference
+from merge_cosim.report.methods import in_order
+from merge_cosim.scenarios.methods import is_reference
 
 COLUMNS = (
     Column("scenario", "scenario"),

@@ -21,6 +21,8 @@ HUMAN = "human"
 """The logged host itself, on replay: rows made from the log, no estimator."""
 CONSTANT = ("always-go", "always-yield")
 """The methods that `oracle-best` chooses from."""
+REFERENCES = (*CONSTANT, "always-brake", "oracle-label", ORACLE_BEST, HUMAN)
+"""What bounds the methods: constant decisions, oracles and the logged host. They do not compete."""
 
 C = TypeVar("C", bound=Component)
 MethodPart = str | Component | type[Component]
@@ -208,3 +210,8 @@ def refuse_unused(settings: Mapping[str, Any], methods: Iterable[Method]) -> Non
             others = sorted(key for key in known if key.partition(".")[2] == name.partition(".")[2])
             hint = f"set {' or '.join(others)}" if others else "leave it out"
             raise UserError(f"{name}: no chosen method has this parameter; {hint}, or choose another method")
+
+
+def is_reference(method: str) -> bool:
+    """Whether a method only bounds the others."""
+    return method.partition("+")[0] in REFERENCES

@@ -4,10 +4,11 @@ import pandas as pd
 import pytest
 
 from merge_cosim.report.columns import Column, Table
-from merge_cosim.report.methods import COLORS, in_order, is_reference, looks
+from merge_cosim.report.methods import COLORS, in_order, looks
 from merge_cosim.report.published import published
 from merge_cosim.report.tables import Section, main_table, sections, strata_table, summary_frame, variation_table
 from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
+from merge_cosim.scenarios.methods import is_reference
 
 GRID = Section("designed-2", "designed", "designed")
 

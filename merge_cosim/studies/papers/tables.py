@@ -15,9 +15,10 @@ from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ngsim.surrogate.recipe import RECIPES
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.report.columns import Column, Table
-from merge_cosim.report.methods import in_order, is_reference
+from merge_cosim.report.methods import in_order
 from merge_cosim.report.model_tables import gmm_table
 from merge_cosim.report.published import CYCLE_MS, VALIDITY, Figure, published
+from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.studies.bounds import MOST_DELAY, bounds_of
 from merge_cosim.studies.papers.evidence import Evidence

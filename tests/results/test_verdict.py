@@ -1,0 +1,118 @@
+"""The verdict's sentence on small tables whose counts are known."""
+
+import pandas as pd
+import pytest
+from scipy.stats import fisher_exact
+
+from merge_cosim.results.statistics.verdict import holm, percent, verdict, verdicts
+
+
+def _summary(source="designed", /, **methods):
+    """Summary rows from (n, failures, stuck, delay) by method."""
+    keys = ("n", "failures", "stuck", "delay_s")
+    same = {"scenario": "s", "variation": "", "site": "x", "source": source}
+    return pd.DataFrame(
+        [same | {"method": name.replace("_", "-")} | dict(zip(keys, row, strict=True)) for name, row in methods.items()]
+    )
+
+
+def _rows(source, /, **failing):
+    """Result rows of 40 cases; by method the numbers of the cases that failed."""
+    same = {"scenario": "s", "variation": "", "site": "x", "source": source, "censored": False, "stuck": False}
+    return pd.DataFrame(
+        [same | {"method": m, "case": f"{i}", "failed": i in bad} for m, bad in failing.items() for i in range(40)]
+    )
+
+
+def test_a_grid_has_counts_without_a_test_and_references_do_not_compete():
+    found = verdict(
+        _summary(
+            pgm=(6875, 186, 175, 2.0), ipcb=(6875, 0, 0, 0.9), acc=(6875, 196, 0, 0.6), oracle_best=(6875, 0, 0, 0.0)
+        )
+    )
+    assert found.sentence == (
+        "ipcb fails or gets stuck least: 0 of 6,875 cases; acc 196 (2.9 %); pgm 361 (5.3 %). "
+        "The cases are a fixed grid, so these are counts without chance."
+    )
+    assert (found.order, found.best, found.undecided) == (("ipcb", "acc", "pgm"), ("ipcb",), ())
+
+
+def test_ties_are_named_together_the_faster_first():
+    found = verdict(_summary(slow=(27, 1, 0, 2.0), fast=(27, 1, 0, 1.0), bad=(27, 27, 0, 0.0)))
+    assert found.sentence.startswith("fast and slow fail least: 1 of 27 cases each (3.7 %); bad 27 (100.0 %).")
+    assert found.best == ("fast", "slow")
+
+
+def test_many_methods_are_counted_after_the_first():
+    methods = {f"m{i}": (100, i, 0, 1.0) for i in range(9)}
+    assert verdict(_summary(**methods)).sentence.startswith(
+        "m0 fails least: 0 of 100 cases; m1 1 (1.0 %); m2 2 (2.0 %); m3 3 (3.0 %); m4 4 (4.0 %); "
+        "4 more up to 8 (8.0 %) (m8)."
+    )
+
+
+@pytest.mark.parametrize(
+    ("methods", "sentence"),
+    [
+        ({}, "Only references were run: there is no method to judge."),
+        ({"always_go": (9, 1, 0, 0.0)}, "Only references were run: there is no method to judge."),
+        ({"acc": (0, 0, 0, None)}, "No case could be scored to the end: there is nothing to judge."),
+        (
+            {"pgm": (100, 2, 1, 1.0)},
+            "pgm: 3 of 100 cases failed or stuck (3.0 %); 2 failed, 1 stuck. No other method to compare with.",
+        ),
+        ({"acc": (9, 0, 0, 1.0)}, "acc: 0 of 9 cases failed (0.0 %). No other method to compare with."),
+        (
+            {"acc": (9, 0, 0, 1.0), "pgm": (9, 0, 0, 0.5)},
+            "No difference between pgm and acc: each 0 of 9 cases failed.",
+        ),
+        (
+            {"acc": (9, 9, 0, 1.0), "pgm": (8, 8, 0, 0.5)},
+            "No difference between pgm and acc: 100.0 % failed.",
+        ),
+    ],
+)
+def test_borderline_tables(methods, sentence):
+    assert verdict(_summary(**methods)).sentence == sentence
+
+
+def test_a_sample_is_judged_on_the_same_cases():
+    rows = _rows("random", a=[0], b=range(9), c=[1, 2])
+    found = verdict(_summary("random", a=(40, 1, 0, 1.0), b=(40, 9, 0, 1.0), c=(40, 2, 0, 1.0)), rows)
+    # a against b: case 0 fails under both, 8 under b alone: p = 2 / 2^8, times 2; against c: 1 and 2, p = 1
+    assert found.undecided == ("c",)
+    assert found.sentence == (
+        "a fails least: 1 of 40 cases (2.5 %); c 2 (5.0 %); b 9 (22.5 %). "
+        "Differences between a and c are undecided (p ≥ 0.05, Holm)."
+    )
+
+
+def test_without_common_cases_by_fishers_test():
+    summary = _summary("traffic", a=(30, 0, 0, 1.0), b=(30, 6, 0, 1.0), c=(31, 20, 1, 1.0))
+    assert fisher_exact([[0, 30], [6, 24]]).pvalue == pytest.approx(0.0237, abs=1e-4)
+    found = verdict(summary, _rows("traffic", a=[], b=[], c=[]))
+    assert found.undecided == ()
+    assert found.sentence.endswith(
+        "b 6 of 30 (20.0 %); c 21 of 31 (67.7 %). Every difference from a is beyond chance (p < 0.05, Holm)."
+    )
+    assert verdict(summary.assign(failures=[0, 5, 6])).undecided == ("b",)
+
+
+def test_holm_against_its_textbook_steps():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([]) == []
+
+
+def test_small_shares_show_two_decimals():
+    assert [percent(value) for value in (0.0, 0.04, 0.1, 12.34)] == ["0.0 %", "0.04 %", "0.1 %", "12.3 %"]
+
+
+def test_one_verdict_for_each_site_and_the_rows_of_all_sites_together():
+    def at(site):
+        return _summary("random", a=(40, 0, 0, 1.0), b=(40, 8, 0, 1.0)).assign(site=site)
+
+    rows = _rows("random", a=[], b=range(8))
+    both = pd.concat([rows, rows.assign(site="y", case=rows["case"] + "y")])
+    found = verdicts(pd.concat([at("x"), at("y"), at("all")]).assign(), both)
+    assert list(found) == [("s", "x", "random"), ("s", "y", "random"), ("s", "all", "random")]
+    assert all(one.undecided == () for one in found.values())
