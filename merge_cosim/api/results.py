@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import weakref
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from merge_cosim.api.plots import Plots
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
+from merge_cosim.ngsim.data import find_data
 from merge_cosim.report.comparison import compare
 from merge_cosim.report.page import write_report
 from merge_cosim.results.store import MANIFEST, SUMMARY_JSON, ResultFolder
+
+if TYPE_CHECKING:
+    from merge_cosim.sweeps.verify import Verification
 
 SHOWN = (
     *("scenario", "variation", "site", "source", "method", "n", "failures", "failure_pct", "ci_low_pct", "ci_high_pct"),
@@ -139,6 +145,52 @@ class Results:
             UserError: One of them was not run, or they have no case in common.
         """
         return compare(self.path, (other or self).path, (first, second))[0].data
+
+    def verify(
+        self,
+        share: float = 0.05,
+        *,
+        seed: int = 0,
+        data: str | Path | None = None,
+        model: str | Path | None = None,
+        plugins: Sequence[str | Path] = (),
+        jobs: int | None = None,
+        tolerance: float | None = None,
+    ) -> Verification:
+        """Run a share of the rows again in SUMO, in fresh processes, and compare them with what is stored.
+
+        Example:
+            >>> print(results.verify(0.1))  # doctest: +SKIP
+
+        Args:
+            share: Share of the rows of each scenario, variation and method, above 0 and up to 1.
+            seed: Seed of the choice of rows.
+            data: As in `merge_cosim.sweep`.
+            model: Model file or name; the one of the rows' name, if not given.
+            plugins: As in `merge_cosim.sweep`.
+            jobs: As in `merge_cosim.sweep`.
+            tolerance: Largest difference of a measure, absolute, or relative where the measure is above 1. If not
+                given: 1e-4 for rows of the closed form, 0 for others.
+
+        Returns:
+            `rows` that were run again, `differences` by column, `beyond` (values beyond the tolerance), and `notes` on
+            versions that have changed.
+
+        Raises:
+            UserError: What the folder was made from is not here.
+        """
+        from merge_cosim.sweeps.verify import verify
+
+        return verify(
+            self.path,
+            share,
+            seed,
+            find_data(None if data is None else Path(data)),
+            None if model is None else str(model),
+            [Path(plugin) for plugin in plugins],
+            jobs or os.cpu_count() or 1,
+            tolerance,
+        )
 
     def report(self, file: str | Path | None = None, against: str | None = None) -> Path:
         """Write the report: one HTML page that needs nothing else; its tables go to `tables/` of the result folder.

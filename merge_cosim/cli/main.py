@@ -27,7 +27,7 @@ from merge_cosim.cli.options import (
     methods_like,
     scenarios_like,
 )
-from merge_cosim.cli.show import die, print_json, show_table
+from merge_cosim.cli.show import die, print_json, show_table, show_verification
 from merge_cosim.core.errors import UserError
 
 app = typer.Typer(
@@ -92,6 +92,9 @@ def sweep(
     start: Annotated[Start, typer.Option(help="How processes are started.")] = "spawn",
     dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to run on, or 'local'.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Finish an interrupted sweep.")] = False,
+    verify: Annotated[
+        float | None, typer.Option(metavar="SHARE", help="Afterwards run this share of the rows again in SUMO.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Run scenarios under methods and store one row per case."""
@@ -131,6 +134,8 @@ def sweep(
             show_table([{name: row[name] for name in shown} for row in traffic], "the traffic as a whole")
     for line in results.notes():
         typer.echo(line, err=True)
+    if verify is not None:
+        show_verification(results.verify(verify, data=data, model=model, plugins=plugin or (), jobs=jobs), json)
 
 
 def _joined(varied: Iterable[tuple[str, list[Any]]]) -> dict[str, list[Any]]:

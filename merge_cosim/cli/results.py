@@ -1,12 +1,12 @@
-"""`merge-cosim report`, `compare`, `reproduce`, `bounds` and `bench`: results and what is made from them."""
+"""`merge-cosim report`, `compare`, `verify`, `reproduce`, `bounds` and `bench`: results and what is made from them."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Seed, Sets, World
-from merge_cosim.cli.show import print_json, show_table
+from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Model, Plugins, Seed, Sets, World
+from merge_cosim.cli.show import print_json, show_table, show_verification
 
 app = typer.Typer()
 
@@ -48,6 +48,30 @@ def compare(
     show_table([dict(zip(headings, row, strict=True)) for row in table.cells], table.title)
     for line in differences:
         typer.echo(line)
+
+
+@app.command()
+def verify(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
+    share: Annotated[float, typer.Option(help="Share of the rows of each scenario, variation and method.")] = 0.05,
+    seed: Annotated[int, typer.Option(help="Seed of the choice of rows.")] = 0,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(help="Largest difference of a measure; 1e-4 for rows of the closed form, else 0, if not given."),
+    ] = None,
+    data: Data = None,
+    model: Model = None,
+    plugin: Plugins = None,
+    jobs: Jobs = None,
+    json: Json = False,
+) -> None:
+    """Run a share of a sweep's rows again in SUMO and compare; exit status 1 if they differ beyond the tolerance."""
+    from merge_cosim.api.results import Results
+
+    found = Results(folder).verify(
+        share, seed=seed, data=data, model=model, plugins=plugin or (), jobs=jobs, tolerance=tolerance
+    )
+    show_verification(found, json)
 
 
 @app.command()

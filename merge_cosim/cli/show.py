@@ -4,7 +4,10 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
+
+if TYPE_CHECKING:
+    from merge_cosim.sweeps.verify import Verification
 
 
 def print_json(document: Any) -> None:
@@ -24,6 +27,24 @@ def die(message: str) -> NoReturn:
     """Say in one line what the user can mend, and end with status 2."""
     print(f"merge-cosim: {' '.join(message.split())}", file=sys.stderr)
     sys.exit(2)
+
+
+def show_verification(found: "Verification", json: bool = False) -> None:
+    """Print what came out of running rows again, and end with status 1 if values differ beyond the tolerance."""
+    rows = found.differences.astype(object).where(found.differences.notna(), None).to_dict("records")
+    if json:
+        print_json({"rows": found.rows, "beyond": found.beyond, "differences": rows, "notes": found.notes})
+    else:
+        if rows:
+            show_table([{str(name): _exact(value) for name, value in row.items()} for row in rows], "what differs")
+        for line in (*found.notes, str(found)):
+            print(line)
+    if found.beyond:
+        sys.exit(1)
+
+
+def _exact(value: Any) -> Any:
+    return f"{value:.6g}" if isinstance(value, float) else value
 
 
 def show_table(rows: Sequence[Mapping[str, Any]], title: str) -> None:

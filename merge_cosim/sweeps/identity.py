@@ -25,6 +25,7 @@ def identity(request: SweepRequest, tasks: Sequence[Task]) -> dict[str, Any]:
         "versions": software(),
         "world": request.world,
         "seed": request.seed,
+        "source": request.source,
         "methods": method_names(request, tasks),
         "parameters": {
             " ".join(filter(None, (task.method.name, task.variation))): {

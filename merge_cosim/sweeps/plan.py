@@ -109,18 +109,41 @@ def plan(request: SweepRequest) -> list[Task]:
             if varied in of_components:
                 methods = [method for method in methods if varied in method.parameters()]
             for scenario, given in _scenarios(request.scenarios, of_scenario, varied):
-                if scenario.is_scene:
-                    tasks += _traffic_tasks(scenario, label, methods, request)
-                    continue
-                key = scenario.encounters_key if given is None else scenario.name
-                if key not in loaded:
-                    found = load_encounters(scenario, request.data, request.source) if given is None else given
-                    loaded[key] = _by_name(found)
-                tasks += _encounter_tasks(scenario, label, methods, loaded[key], request)
+                tasks += tasks_of(scenario, label, methods, request, loaded, given)
     if not tasks:
         raise UserError("nothing to run: no method fits the scenarios")
     reference_of(method_names(request, tasks), request.against)
     return sorted(tasks, key=lambda task: (task.scenario.name, task.variation, task.method.name))
+
+
+def tasks_of(
+    scenario: Scenario,
+    variation: str,
+    methods: list[Method],
+    request: SweepRequest,
+    loaded: dict[str, Encounters],
+    given: Encounters | None = None,
+) -> Iterator[Task]:
+    """The tasks of one scenario under some methods.
+
+    Args:
+        scenario: The scenario, variation applied.
+        variation: What was varied in it.
+        methods: The methods; those that cannot run on it are left out.
+        request: Data, models, seed and world.
+        loaded: Encounters that other scenarios share; what is loaded is added.
+        given: Its encounters, where a Python program hands them over.
+
+    Raises:
+        UserError: Its data are absent or do not fit.
+    """
+    if scenario.is_scene:
+        return _traffic_tasks(scenario, variation, methods, request)
+    key = scenario.encounters_key if given is None else scenario.name
+    if key not in loaded:
+        found = load_encounters(scenario, request.data, request.source) if given is None else given
+        loaded[key] = _by_name(found)
+    return _encounter_tasks(scenario, variation, methods, loaded[key], request)
 
 
 def method_names(request: SweepRequest, tasks: Sequence[Task]) -> list[str]:
