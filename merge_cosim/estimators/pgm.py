@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from pydantic import NonNegativeFloat
 
@@ -29,6 +29,8 @@ class GraphicalModel(Estimator):
         transition_lag: Cycles between the two speeds of a transition; the overlapping transitions of a longer lag are
             weighted by 1 / lag.
         uniform: Share of the uniform distribution in the time term.
+        roles: `counted`: times to arrival and prior as counted (Eq. 3). `symmetric`: every pair is counted with the
+            roles swapped as well, so that the prior is even and equal times to arrival say nothing.
     """
 
     needs_model: ClassVar[bool] = True
@@ -37,6 +39,7 @@ class GraphicalModel(Estimator):
     time_weight: NonNegativeFloat = 1.0
     transition_lag: Count = 1
     uniform: Share = 0.05
+    roles: Literal["counted", "symmetric"] = "counted"
 
     @abstractmethod
     def _log_ratio(self, model: IntentionModel) -> LogRatio:
@@ -45,8 +48,10 @@ class GraphicalModel(Estimator):
     def use(self, model: IntentionModel) -> None:
         """Make the tables of log-odds."""
         self._speeds = SpeedEvidence(self._log_ratio(model), self.transition_lag, max(self.nodes - 1, 1))
-        self._time_table = model.arrivals.log_odds(self.uniform) * self.time_weight
-        self._prior = model.prior_log_odds
+        symmetric = self.roles == "symmetric"
+        arrivals = model.arrivals.symmetric() if symmetric else model.arrivals
+        self._time_table = arrivals.log_odds(self.uniform) * self.time_weight
+        self._prior = 0.0 if symmetric else model.prior_log_odds
 
     def start(self, count: int, setting: Setting) -> None:
         """Make room for the last transitions and speeds."""
@@ -102,3 +107,12 @@ class PgmSpeed(Pgm):
 
     name: ClassVar[str] = "pgm-speed"
     time_weight: NonNegativeFloat = 0.0
+
+
+@estimators.register
+@dataclass(kw_only=True)
+class PgmSymmetric(Pgm):
+    """PGM that counts every training pair with the roles swapped as well (variant)."""
+
+    name: ClassVar[str] = "pgm-symmetric"
+    roles: Literal["counted", "symmetric"] = "symmetric"

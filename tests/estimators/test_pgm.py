@@ -8,7 +8,7 @@ from small import begin, seen, small_model
 
 from merge_cosim.estimators.learned.histogram import speed_bin, time_bin
 from merge_cosim.estimators.learned.model import IntentionModel
-from merge_cosim.estimators.pgm import Pgm, PgmTime
+from merge_cosim.estimators.pgm import Pgm, PgmSymmetric, PgmTime
 
 
 def test_one_node_is_time_and_prior():
@@ -40,3 +40,9 @@ def test_the_running_sum_is_the_direct_sum(speeds, nodes, lag):
         # while fewer cycles than the window have passed, all transitions so far count
         expected = sum(transitions[first_allowed:]) + model.prior_log_odds
         assert got == pytest.approx(expected, abs=1e-9)
+
+
+def test_symmetric_roles_leave_ties_open():
+    estimator = begin(PgmSymmetric(alpha=0.0), IntentionModel.load("us101-ngsim"))
+    tie = seen(10.0)
+    assert estimator.update(tie).tolist() == [0.0]

@@ -10,7 +10,7 @@ import numpy as np
 from merge_cosim.core.encounter import Encounters, Intention
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT, FloatArray, IntArray, time_to_arrival
-from merge_cosim.estimators.learned.histogram import TIME_BIN, TIME_BINS, ArrivalHistogram, time_bin
+from merge_cosim.estimators.learned.histogram import TIME_BINS, ArrivalHistogram, time_bin
 from merge_cosim.estimators.learned.model import IntentionModel, SpeedModel
 
 LAGS = (1, 5, 10)
@@ -43,7 +43,7 @@ def fit(encounters: Encounters, name: str, settings: Mapping[str, Any]) -> Inten
         merging = merging[: len(host)]
         t_m = time_to_arrival(merging, speed[: len(host)])
         t_h = time_to_arrival(host, _speeds(host))
-        use = (merging < 0) & (host < 0) & (np.maximum(t_m, t_h) < TIME_BINS * TIME_BIN)
+        use = (merging < 0) & (host < 0)
         if use.any():
             np.add.at(arrivals[label], (time_bin(t_m[use]), time_bin(t_h[use])), 1.0 / use.sum())
     return IntentionModel(

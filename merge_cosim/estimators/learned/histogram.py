@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from merge_cosim.core.encounter import Intention
-from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 
 SPEED_BIN = 1.0
 """Width of a speed bin [m/s] (Dong, Dolan, Litkouhi 2017, Sec. IV-A)."""
@@ -16,6 +16,9 @@ SPEED_BINS = 40
 TIME_BIN = 0.5
 """Width of a bin of time to arrival [s]."""
 TIME_BINS = 30
+"""Bins of time to arrival; the last one is open: it holds all times from 14.5 s on, in training and in look-up alike."""
+SUPPORT = 2
+"""A cell of times to arrival that is further than this [bins] from every filled one says nothing."""
 
 
 def speed_bin(speed: FloatArray) -> IntArray:
@@ -24,7 +27,7 @@ def speed_bin(speed: FloatArray) -> IntArray:
 
 
 def time_bin(time: FloatArray) -> IntArray:
-    """Index of each time to arrival's bin; times beyond the table fall into its last bin."""
+    """Index of each time to arrival's bin; the last bin is open."""
     return np.minimum(time / TIME_BIN, TIME_BINS - 1).astype(np.int64)
 
 
@@ -114,8 +117,29 @@ class ArrivalHistogram:
         return (1.0 - uniform) * shares + uniform / shares[0].size
 
     def log_odds(self, uniform: float) -> FloatArray:
-        """Return `log P(T_m, T_h | N) - log P(T_m, T_h | Y)`, shape (TIME_BINS, TIME_BINS)."""
-        return log_ratio(self.probabilities(uniform))
+        """Return `log P(T_m, T_h | N) - log P(T_m, T_h | Y)`, shape (TIME_BINS, TIME_BINS); 0 outside the support."""
+        return np.where(self.support, log_ratio(self.probabilities(uniform)), 0.0)
+
+    @cached_property
+    def support(self) -> BoolArray:
+        """The cells that have a filled one at most `SUPPORT` bins away, shape (TIME_BINS, TIME_BINS)."""
+        from scipy.ndimage import maximum_filter  # imported where a model is used: it is slow to import
+
+        filled = (self.shares > 0).any(axis=0)
+        near: BoolArray = maximum_filter(filled, size=2 * SUPPORT + 1, mode="constant", cval=False)
+        return near
+
+    def supports(self, merging_arrival: FloatArray, host_arrival: FloatArray) -> BoolArray:
+        """Whether two times to arrival [s] lie in the support, shape (n,)."""
+        return self.support[time_bin(merging_arrival), time_bin(host_arrival)]
+
+    def symmetric(self) -> ArrivalHistogram:
+        """Count every pair once more with the roles swapped: the host yields where the merging car does not.
+
+        Merging is topologically symmetric (Dong, Dolan, Litkouhi 2017). Equal times then say nothing.
+        """
+        merging_yields, host_yields = self.shares
+        return ArrivalHistogram(np.stack([merging_yields + host_yields.T, host_yields + merging_yields.T]))
 
 
 def blurred(counts: FloatArray) -> FloatArray:

@@ -55,3 +55,12 @@ def test_both_intentions_are_needed():
         fit(steady, "m", {})
     with pytest.raises(UserError, match="training needs logged encounters"):
         fit(replace(pairs(), log=None), "m", {})
+
+
+def test_frames_of_long_times_to_arrival_are_counted_in_the_last_bin():
+    slow = pairs()
+    slow.log.host_station.values[:] *= 3.0  # the hosts are up to 300 m away: 20 s and more at their speeds
+    slow.log.host_station.values[:] -= 400.0
+    shares = fit(slow, "m", {}).arrivals.shares
+    np.testing.assert_allclose(shares.sum(axis=(1, 2)), 1.0)
+    assert shares[:, :, -1].sum() > 0.1

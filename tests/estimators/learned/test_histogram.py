@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from small import small_histogram, small_model
 
-from merge_cosim.estimators.learned.histogram import SPEED_BINS, SpeedHistogram, speed_bin, time_bin
+from merge_cosim.estimators.learned.histogram import (
+    SPEED_BINS,
+    TIME_BINS,
+    ArrivalHistogram,
+    SpeedHistogram,
+    speed_bin,
+    time_bin,
+)
 
 
 def test_bins_end_where_the_table_does():
@@ -68,3 +75,32 @@ def test_time_probabilities_sum_to_one_and_peak_where_counted():
     np.testing.assert_allclose(both.sum(axis=(1, 2)), 1.0)
     assert np.unravel_index(both[0].argmax(), both[0].shape) == (10, 4)
     assert arrivals.log_odds(0.05)[4, 10] > 0 > arrivals.log_odds(0.05)[10, 4]
+
+
+def filled(*cells):
+    shares = np.zeros((2, TIME_BINS, TIME_BINS))
+    for intention, merging, host in cells:
+        shares[intention, merging, host] = 1.0
+    return ArrivalHistogram(shares)
+
+
+def test_cells_far_from_every_filled_one_say_nothing():
+    arrivals = filled((0, 4, 10), (1, 10, 4))
+    odds = arrivals.log_odds(0.05)
+    assert odds[4, 12] < 0 < odds[12, 4]  # two bins away
+    assert odds[4, 13] == odds[20, 20] == 0.0
+    inside = arrivals.supports(np.array([2.0, 2.0, 400.0]), np.array([6.4, 6.5, 400.0]))
+    assert inside.tolist() == [True, False, False]
+
+
+def test_the_last_bin_is_open():
+    arrivals = filled((0, 4, 29), (1, 29, 4))
+    assert arrivals.log_odds(0.05)[time_bin(np.array([2.0])), time_bin(np.array([40.0]))] < 0
+    assert arrivals.supports(np.array([2.0]), np.array([1e9])).all()
+
+
+def test_with_the_roles_swapped_equal_times_say_nothing():
+    odds = filled((0, 4, 10), (0, 5, 5), (1, 6, 3)).symmetric().log_odds(0.05)
+    np.testing.assert_allclose(odds, -odds.T, atol=1e-12)
+    assert (np.diag(odds) == 0.0).all()
+    assert odds[4, 10] < 0 < odds[10, 4]
