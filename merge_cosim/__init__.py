@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from merge_cosim.api.listing import list_methods, list_models, list_ramps, list_scenarios
     from merge_cosim.api.results import Results, load_results
     from merge_cosim.api.run import Run, run
-    from merge_cosim.api.studies import Training, bounds, export, reproduce, train
+    from merge_cosim.api.studies import Training, bounds, export, reproduce, train, train_ensemble
     from merge_cosim.api.sweep import sweep
     from merge_cosim.controllers.base import Controller, controller
     from merge_cosim.core.encounter import Encounters, Intention
@@ -57,6 +57,7 @@ _HOME = {
     "run": "api.run",
     "sweep": "api.sweep",
     "train": "api.studies",
+    "train_ensemble": "api.studies",
 }
 """The module that each name is defined in."""
 
@@ -64,6 +65,7 @@ __all__ = [  # noqa: RUF022
     "sweep",
     "run",
     "train",
+    "train_ensemble",
     "load_results",
     "load_scenario",
     "list_methods",

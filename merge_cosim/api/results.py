@@ -18,7 +18,7 @@ from merge_cosim.core.registry import did_you_mean
 from merge_cosim.ngsim.data import find_data
 from merge_cosim.report.comparison import compare
 from merge_cosim.report.page import write_report
-from merge_cosim.results.store import MANIFEST, SUMMARY_JSON, ResultFolder
+from merge_cosim.results.store import ENSEMBLE_CSV, MANIFEST, RIVALS_CSV, SUMMARY_JSON, ResultFolder
 
 if TYPE_CHECKING:
     from merge_cosim.sweeps.verify import Verification
@@ -86,6 +86,14 @@ class Results:
             >>> results.summary().set_index("method")["failure_pct"]  # doctest: +SKIP
         """
         return pd.DataFrame(self._store.read_json(SUMMARY_JSON))
+
+    def ensemble(self) -> pd.DataFrame:
+        """Where methods were run with several models: one row per method with the median and range over models."""
+        return self._store.table(ENSEMBLE_CSV)
+
+    def rivals(self) -> pd.DataFrame:
+        """For every two methods run with several models: with how many of them one beats the other."""
+        return self._store.table(RIVALS_CSV)
 
     def traffic(self) -> pd.DataFrame:
         """Where there was living traffic: one row per scenario, variation and method about the traffic as a whole."""

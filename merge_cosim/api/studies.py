@@ -49,6 +49,7 @@ def train(
     source: SourceChoice | None = None,
     split: Literal["car", "pair"] = "car",
     seed: int = 0,
+    everything: bool = False,
 ) -> Training:
     """Learn speed transitions, times to arrival and the prior from one third of a site's pairs, and judge the rest.
 
@@ -63,6 +64,7 @@ def train(
         source: `"ngsim"` or `"surrogate"`: force real data or the surrogate.
         split: What is kept together on one side of the split.
         seed: Seed of the split.
+        everything: Learn from all pairs; then none is left to judge the model on.
 
     Raises:
         UserError: There are no such pairs, or too few of one intention, or `out` is no `.json`.
@@ -70,8 +72,46 @@ def train(
     from merge_cosim.studies.training import train as train_model
 
     folder = find_data(None if data is None else Path(data))
-    report = train_model(str(site), folder, source, split, seed, Path(out))
+    report = train_model(str(site), folder, source, split, seed, Path(out), everything)
     return Training(IntentionModel.load(out), Path(out), report)
+
+
+def train_ensemble(
+    out: str | Path,
+    *,
+    site: str | Path = "us101",
+    data: str | Path | None = None,
+    source: SourceChoice | None = None,
+    seed: int = 0,
+    splits: int = 0,
+    folds: int = 0,
+) -> pd.DataFrame:
+    """Train several models, so that what depends on the training cars can be seen.
+
+    Example:
+        >>> mc.train_ensemble("models/splits", splits=10, source="surrogate")  # doctest: +SKIP
+        >>> mc.sweep("designed-2", "pgm", model="models/splits").ensemble()  # doctest: +SKIP
+
+    Args:
+        out: Folder of the model files; give it as `model` to `merge_cosim.sweep`.
+        site: As in `train`.
+        data: As in `train`.
+        source: As in `train`.
+        seed: Seed of the first split, or of the folds.
+        splits: Number of models, each trained on another third of the merging cars.
+        folds: Instead, number of parts of the merging cars; each model is trained on all parts but one, so that every
+            pair is tested by the one model that has not seen its car (cross-fitting).
+
+    Returns:
+        One row per model: file, numbers of training pairs and cars.
+
+    Raises:
+        UserError: As in `train`; or not exactly one of `splits` and `folds` is given, or there are too few cars.
+    """
+    from merge_cosim.studies.training import train_ensemble as train_models
+
+    folder = find_data(None if data is None else Path(data))
+    return pd.DataFrame(train_models(str(site), folder, source, seed, Path(out), splits, folds))
 
 
 def bounds(

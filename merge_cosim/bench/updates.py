@@ -23,7 +23,7 @@ CYCLES = 60
 
 def estimator_costs(rounds: int) -> list[dict[str, Any]]:
     """Time of one update per encounter [us], median over `rounds` rounds in which the estimators take turns."""
-    model = IntentionModel.load(default_model("designed"))
+    model = IntentionModel.load(default_model("ngsim"))
     names = estimators.names()
     times: dict[tuple[str, int], list[float]] = {(name, count): [] for name in names for count in (TILES, 1)}
     for _ in range(rounds):

@@ -243,18 +243,30 @@ def export(
 
 @app.command()
 def train(
-    out: Annotated[Path, typer.Option(help="Model file to write (.json).")],
+    out: Annotated[Path, typer.Option(help="Model file to write (.json); with --splits or --folds a folder.")],
     data: Data = None,
     site: Annotated[str, typer.Option(help="Site to train on: a shipped ramp, or a folder with site.toml.")] = "us101",
     source: ForceSource = None,
     split: Annotated[Literal["car", "pair"], typer.Option(help="What is kept together on one side.")] = "car",
     seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
+    splits: Annotated[int, typer.Option(help="Train so many models, each on another third.", min=0)] = 0,
+    folds: Annotated[int, typer.Option(help="Train so many models, each on all cars but one part's.", min=0)] = 0,
+    everything: Annotated[bool, typer.Option("--all", help="Train on all pairs, none is left to judge.")] = False,
     json: Json = False,
 ) -> None:
-    """Learn speed transitions, times to arrival and the prior from one third of a site's pairs, and judge the rest."""
-    from merge_cosim.api.studies import train as train_model
+    """Learn speed transitions, times to arrival and the prior from one third of a site's pairs, and judge the rest.
 
-    report = train_model(out, site=site, data=data, source=source, split=split, seed=seed).report
+    With --splits or --folds several models go into a folder, for `sweep --model FOLDER`.
+    """
+    from merge_cosim.api import studies
+
+    if splits or folds:
+        made = studies.train_ensemble(out, site=site, data=data, source=source, seed=seed, splits=splits, folds=folds)
+        rows = made.to_dict("records")
+        print_json(rows) if json else show_table(rows, f"models in {out}")
+        return
+    trained = studies.train(out, site=site, data=data, source=source, split=split, seed=seed, everything=everything)
+    report = trained.report
     if json:
         print_json(report)
     else:

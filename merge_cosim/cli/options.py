@@ -41,7 +41,9 @@ Methods = Annotated[
         autocompletion=methods_like,
     ),
 ]
-Model = Annotated[str | None, typer.Option(help="Model file, or name of a model that comes with the project.")]
+Model = Annotated[
+    str | None, typer.Option(help="Model file, folder of model files, or name of a model that comes with the project.")
+]
 Sets = Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, such as acc.headway=1.2 or test.horizon=5.")]
 Plugins = Annotated[list[Path] | None, typer.Option(help="Python file with components of your own.")]
 Against = Annotated[

@@ -10,7 +10,8 @@ import pyarrow as pa
 from merge_cosim.controllers.law import FreeDriving
 from merge_cosim.core.encounter import NEVER, Encounters, Intention
 from merge_cosim.core.observation import Setting
-from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, time_to_arrival
+from merge_cosim.core.units import MIN_SPEED, AnyArray, BoolArray, FloatArray, time_to_arrival
+from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.results.schema import SCHEMA
 from merge_cosim.scoring.decisions import GATES
 from merge_cosim.scoring.scoring import GOAL, KINDS
@@ -24,6 +25,7 @@ def result_rows(
     setting: Setting,
     free_law: FreeDriving,
     names: dict[str, str],
+    model: IntentionModel | None = None,
 ) -> pa.Table:
     """Return the result rows of a run.
 
@@ -33,6 +35,7 @@ def result_rows(
         setting: Speed limit and cycle.
         free_law: The free driving that the delay is measured against.
         names: `scenario`, `variation`, `method` and `model` of all rows.
+        model: The learned model of the method, if it has one.
     """
     c, n, dt = run.columns, len(encounters), setting.dt
     failed = c["kind"] > 0
@@ -50,6 +53,8 @@ def result_rows(
     unfinished = ~failed & ~c["scored_to_end"]
     censored = unfinished & c.get("cut_off", (c["end_cycle"] >= score_until) | (c["scored_from"] >= 0))
     reached = ~np.isnan(c["host_reached_s"]) | (encounters.host_station >= 0)
+    stuck = unfinished & ~reached & ~censored
+    waiting = (c["end_merging_station"] < 0) & (np.maximum(c["end_speed"], c["end_merging_speed"]) < MIN_SPEED)
     columns: dict[str, AnyArray | pa.Array] = {
         "site": encounters.site,
         "source": encounters.source,
@@ -61,7 +66,9 @@ def result_rows(
         "merging_speed_0": encounters.merging_speed,
         "failed": failed,
         "failure_kind": np.array(KINDS)[c["kind"].astype(np.int64)],
-        "stuck": unfinished & ~reached & ~censored,
+        "stuck": stuck,
+        "deadlock": stuck & waiting,
+        "in_support": _supported(model, encounters),
         "censored": censored,
         "extended": c["end_cycle"] > last_logged,
         "smoothed_source": encounters.smoothed_source,
@@ -130,6 +137,14 @@ def _delay(c: dict[str, AnyArray], encounters: Encounters, setting: Setting, law
     arrival = np.where(np.isnan(c["goal_s"]), c["end_cycle"] * setting.dt + rest, c["goal_s"])
     delay: FloatArray = arrival - free_time(encounters.host_station, encounters.host_speed, setting, law)
     return delay
+
+
+def _supported(model: IntentionModel | None, encounters: Encounters) -> pa.Array:
+    if model is None:
+        return pa.nulls(len(encounters), pa.bool_())
+    merging = time_to_arrival(encounters.merging_station, encounters.merging_speed)
+    host = time_to_arrival(encounters.host_station, encounters.host_speed)
+    return pa.array(model.arrivals.supports(merging, host))
 
 
 def _earlier(first: FloatArray, second: FloatArray) -> BoolArray:

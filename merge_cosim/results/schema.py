@@ -12,7 +12,7 @@ from merge_cosim.scoring.decisions import GATES
 SCHEMA_VERSION = "4"
 """Raised whenever a column is added, removed, or changes its meaning. Folders of other versions are refused."""
 VERSION_KEY = b"merge_cosim_schema"
-KEY = [("scenario", "ascending"), ("variation", "ascending"), ("case", "ascending"), ("method", "ascending")]
+KEY = [(name, "ascending") for name in ("scenario", "variation", "case", "method", "model")]
 """The columns that name a row, in the order in which rows are sorted."""
 
 TEXT, FLAG, NUMBER, COUNT = pa.string(), pa.bool_(), pa.float64(), pa.int32()
@@ -101,6 +101,20 @@ COLUMNS = (
         "",
         "time ran out and the host had not reached the merging point; neither failed nor censored. The delay of such "
         "a case is a lower bound",
+    ),
+    Column(
+        "deadlock",
+        FLAG,
+        "",
+        "stuck because the two cars wait for each other: neither has reached the merging point when the run timed out, "
+        "and both are slower than 0.5 m/s",
+    ),
+    Column(
+        "in_support",
+        FLAG,
+        "",
+        "the case begins at times to arrival that the model's training pairs had (or at most two bins of 0.5 s from "
+        "them); missing without a model",
     ),
     Column(
         "censored",

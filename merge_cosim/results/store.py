@@ -11,6 +11,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
@@ -22,6 +23,7 @@ SCENE_FACTS = b"merge_cosim_scenes"
 """Metadata of a part: the facts of the scenes that its rows come from (JSON)."""
 SCENES_CSV, TRAFFIC_CSV, NOTES_CSV = "scenes.csv", "traffic.csv", "notes.csv"
 STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV = "strata.csv", "belief.csv", "calibration.csv"
+ENSEMBLE_CSV, RIVALS_CSV = "ensemble.csv", "rivals.csv"
 RESULTS, SUMMARY_CSV, SUMMARY_JSON, MANIFEST, TRACES = (
     "results.parquet",
     "summary.csv",
@@ -139,12 +141,34 @@ class ResultFolder:
             found += json.loads((pq.read_schema(file).metadata or {}).get(SCENE_FACTS, b"[]"))
         return found
 
+    def table(self, name: str) -> pd.DataFrame:
+        """One of the folder's CSV tables; empty where there is none."""
+        file = self.path / name
+        return pd.read_csv(file, keep_default_na=False, na_values=[""]) if file.is_file() else pd.DataFrame()
+
     def traffic(self) -> list[dict[str, Any]]:
         """Rows of the finished sweep's table of scenes; none where there were no scenes."""
         return _csv_rows(self.path / TRAFFIC_CSV)
 
     def note_lines(self) -> list[str]:
-        """What was noted in the scenes, a line for each kind of event."""
+        """What the user should know of the results: a line for each kind of event in scenes, and on models."""
+        return [*self._scene_notes(), *self._support_notes()]
+
+    def _support_notes(self) -> list[str]:
+        """How many cases begin where a model was not trained, a line per scenario, variation and model."""
+        found: dict[tuple[str, ...], tuple[int, int]] = {}
+        for row in _csv_rows(self.path / SUMMARY_CSV):
+            outside = row.get("outside_support")
+            if outside and float(outside):
+                key = tuple(row[name] for name in ("scenario", "variation", "site", "source", "model"))
+                found[key] = int(float(outside)), int(row["n"]) + int(row["censored"])
+        return [
+            f"model {key[-1]}: {outside:,} of {n:,} cases of {' '.join(filter(None, key[:2]))} begin at times to "
+            f"arrival that it was not trained on (column in_support)"
+            for key, (outside, n) in found.items()
+        ]
+
+    def _scene_notes(self) -> list[str]:
         events: dict[str, list[dict[str, Any]]] = {}
         for row in _csv_rows(self.path / NOTES_CSV):
             events.setdefault(row["event"], []).append(row)

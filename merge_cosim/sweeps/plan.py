@@ -13,7 +13,7 @@ from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import load_plugin
 from merge_cosim.core.units import IntArray
-from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.estimators.learned.model import IntentionModel, load_models
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.scenarios.encounters import SourceChoice, load_encounters
@@ -113,7 +113,9 @@ def plan(request: SweepRequest) -> list[Task]:
     if not tasks:
         raise UserError("nothing to run: no method fits the scenarios")
     reference_of(method_names(request, tasks), request.against)
-    return sorted(tasks, key=lambda task: (task.scenario.name, task.variation, task.method.name))
+    return sorted(
+        tasks, key=lambda task: tuple(task.names[name] for name in ("scenario", "variation", "method", "model"))
+    )
 
 
 def tasks_of(
@@ -208,24 +210,26 @@ def _traffic_tasks(scenario: Scenario, variation: str, methods: list[Method], re
     for method in methods:
         if method.is_human or method.needs_label:
             continue
-        yield Task(
-            scenario=scenario,
-            cases=TrafficCases(traffic, 0, traffic.replications),
-            variation=variation,
-            method=method,
-            model=_model(method, TRAFFIC, request),
-            seed=request.seed,
-        )
+        for model in _models(method, TRAFFIC, request):
+            yield Task(
+                scenario=scenario,
+                cases=TrafficCases(traffic, 0, traffic.replications),
+                variation=variation,
+                method=method,
+                model=model,
+                seed=request.seed,
+            )
 
 
-def _model(method: Method, source: str, request: SweepRequest) -> IntentionModel | None:
-    """The learned model that a method needs; it is found to fit."""
+def _models(method: Method, source: str, request: SweepRequest) -> Sequence[IntentionModel | None]:
+    """The learned models that a method is to be run with, each of which is found to fit; None for one without."""
     if not method.needs_model:
-        return None
+        return [None]
     chosen = request.model or default_model(source)
-    model = chosen if isinstance(chosen, IntentionModel) else IntentionModel.load(chosen)
-    method.driver(model)
-    return model
+    models = [chosen] if isinstance(chosen, IntentionModel) else load_models(chosen)
+    for model in models:
+        method.driver(model)
+    return models
 
 
 def _encounter_tasks(
@@ -236,18 +240,18 @@ def _encounter_tasks(
         chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
         cases = _cases(scenario, chosen, source, request)
         for method in methods_for(chosen, methods):
-            model = _model(method, source, request)
-            if model is not None:
-                _refuse_trained(scenario, chosen, model)
-            yield Task(
-                scenario=scenario,
-                cases=cases,
-                variation=variation,
-                method=method,
-                model=model,
-                seed=request.seed,
-                left_out=left_out,
-            )
+            models = _models(method, source, request)
+            for model in models:
+                tested = cases if model is None else _not_trained_on(scenario, cases, model, several=len(models) > 1)
+                yield Task(
+                    scenario=scenario,
+                    cases=tested,
+                    variation=variation,
+                    method=method,
+                    model=model,
+                    seed=request.seed,
+                    left_out=left_out,
+                )
 
 
 def _cases(scenario: Scenario, encounters: Encounters, source: str, request: SweepRequest) -> PairCases:
@@ -293,16 +297,24 @@ def _taken(encounters: Encounters, rows: IntArray) -> Encounters:
 
 
 def default_model(source: str) -> str:
-    """Name of the project's own model for encounters of a source."""
-    return "us101-surrogate" if source == "surrogate" else "us101-ngsim"
+    """Name of the project's own model for encounters of a source.
+
+    Where no real pair is tested, it is the one trained on all real cars.
+    """
+    return {"surrogate": "us101-surrogate", "ngsim": "us101-ngsim"}.get(source, "us101-ngsim-all")
 
 
-def _refuse_trained(scenario: Scenario, encounters: Encounters, model: IntentionModel) -> None:
-    if not scenario.is_replay or model.source != str(encounters.source[0]):
-        return
-    known = sorted(set(encounters.car.tolist()) & set(model.trained_on))
-    if known:
-        raise UserError(
-            f"scenario {scenario.name}: model {model.name} was trained on {len(known)} of its merging cars "
-            f"(such as {known[0]}); choose another --model or split"
-        )
+def _not_trained_on(scenario: Scenario, cases: PairCases, model: IntentionModel, several: bool) -> PairCases:
+    """The cases whose merging cars a model was not trained on, where it is one of several; else all, or a refusal."""
+    if not scenario.is_replay or model.source != str(cases.pairs.source[0]):
+        return cases
+    trained = np.isin(cases.pairs.car, model.trained_on)
+    if not trained.any():
+        return cases
+    if several and not trained.all():
+        return cases.take(np.flatnonzero(~trained))
+    known = sorted(set(cases.pairs.car[trained].tolist()))
+    raise UserError(
+        f"scenario {scenario.name}: model {model.name} was trained on {len(known)} of its merging cars "
+        f"(such as {known[0]}); choose another --model or split"
+    )

@@ -12,11 +12,14 @@ import pandas as pd
 
 from merge_cosim.results.statistics import belief, calibration, oracle_best, strata, summarise
 from merge_cosim.results.statistics.comparison import reference_of
+from merge_cosim.results.statistics.ensemble import ensemble, rivals
 from merge_cosim.results.statistics.traffic import scene_tables
 from merge_cosim.results.store import (
     BELIEF_CSV,
     CALIBRATION_CSV,
+    ENSEMBLE_CSV,
     MANIFEST,
+    RIVALS_CSV,
     STRATA_CSV,
     SUMMARY_CSV,
     SUMMARY_JSON,
@@ -135,6 +138,7 @@ def _sum_up(
         parts[CALIBRATION_CSV].append(calibration(rows))
     tables = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in parts.items()}
     tables |= scene_tables(scenes)
+    tables |= {ENSEMBLE_CSV: ensemble(tables[SUMMARY_CSV]), RIVALS_CSV: rivals(tables[SUMMARY_CSV])}
     for name, table in tables.items():
         (folder.path / name).unlink(missing_ok=True)
         if len(table):

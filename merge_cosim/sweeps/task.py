@@ -132,4 +132,4 @@ class Task:
 
     def rows(self, run: Run) -> pa.Table:
         """The result rows of a run."""
-        return result_rows(run, run.encounters, self.setting, self.scenario.test.free, self.names)
+        return result_rows(run, run.encounters, self.setting, self.scenario.test.free, self.names, self.model)

@@ -16,7 +16,7 @@ SPEED_BINS = 40
 TIME_BIN = 0.5
 """Width of a bin of time to arrival [s]."""
 TIME_BINS = 30
-"""Bins of time to arrival; the last one is open: it holds all times from 14.5 s on, in training and in look-up alike."""
+"""Bins of time to arrival; the last one is open, in training and in look-up: it holds all times from 14.5 s on."""
 SUPPORT = 2
 """A cell of times to arrival that is further than this [bins] from every filled one says nothing."""
 

@@ -152,6 +152,21 @@ class IntentionModel:
             raise UserError(f"{file}: not a merge-cosim model ({error!r}); make one with 'merge-cosim train'") from None
 
 
+def load_models(name: str | Path) -> list[IntentionModel]:
+    """Read a model by file or name (see `IntentionModel.load`), or all model files of a folder, sorted by name.
+
+    Raises:
+        UserError: There is none, or one is no model.
+    """
+    folder = Path(name)
+    if not folder.is_dir():
+        return [IntentionModel.load(name)]
+    files = sorted(folder.glob("*.json"))
+    if not files:
+        raise UserError(f"{folder}: holds no model file (*.json); make some with 'merge-cosim train --splits 10'")
+    return [IntentionModel.load(file) for file in files]
+
+
 _BOTH = (Intention.YIELD, Intention.NOT_YIELD)
 
 

@@ -6,7 +6,8 @@ from typing import Literal
 import numpy as np
 
 from merge_cosim.core.encounter import Encounters
-from merge_cosim.core.units import BoolArray
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import AnyArray, BoolArray, IntArray
 
 
 def split_cars(
@@ -27,5 +28,27 @@ def split_cars(
         True where an encounter is for training, shape (n,).
     """
     names = np.asarray(encounters.car if by == "car" else encounters.case, dtype=str)
-    drawn = sorted(set(names), key=lambda name: sha256(f"{seed}|{name}".encode()).digest())
+    drawn = _shuffled(names, seed)
     return np.isin(names, drawn[: round(fraction * len(drawn))])
+
+
+def folds_of(encounters: Encounters, folds: int, seed: int = 0) -> IntArray:
+    """Deal the merging cars of some encounters into parts of equal size, all pairs of a car into one.
+
+    Returns:
+        Number of each encounter's part, shape (n,).
+
+    Raises:
+        UserError: There are fewer than two parts, or fewer cars than parts.
+    """
+    names = np.asarray(encounters.car, dtype=str)
+    drawn = _shuffled(names, seed)
+    if not 2 <= folds <= len(drawn):
+        raise UserError(f"train: {folds} folds of {len(drawn)} merging cars; choose 2 to {len(drawn)}")
+    part = {name: number % folds for number, name in enumerate(drawn)}
+    return np.array([part[name] for name in names])
+
+
+def _shuffled(names: AnyArray, seed: int) -> list[str]:
+    """Different names in an order that depends on each name's hash and the seed alone."""
+    return sorted(set(names.tolist()), key=lambda name: sha256(f"{seed}|{name}".encode()).digest())

@@ -87,7 +87,9 @@ def compare_all(rows: pd.DataFrame, against: str | None) -> dict[tuple[str, ...]
     for names, group in frame.groupby(GROUP, sort=True):
         key = tuple(map(str, names))
         in_common = key[: len(SECTION)] if key[SECTION.index("source")] != TRAFFIC else ()
-        other = others.get(in_common, frame.iloc[:0]).drop_duplicates("case")
+        other = others.get(in_common, frame.iloc[:0])
+        same_model = other["model"] == key[GROUP.index("model")]
+        other = (other[same_model] if same_model.any() else other).drop_duplicates("case")
         found[key] = compare(group, other, against, is_sample(group))
     return found
 
@@ -134,6 +136,8 @@ def _summary(
         "failure_pct_best": percent(failures, len(group)),
         "failure_pct_worst": percent(failures + censored, len(group)),
         "stuck": stuck,
+        "deadlocks": int(scored["deadlock"].sum()),
+        "outside_support": None if group["in_support"].isna().all() else int((~group["in_support"].astype(bool)).sum()),
         "failed_or_stuck_pct": percent(failures + stuck, n),
         "failed_or_stuck_low_pct": stuck_low,
         "failed_or_stuck_high_pct": stuck_high,

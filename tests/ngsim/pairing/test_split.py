@@ -5,9 +5,10 @@ from hypothesis import strategies as st
 from trajectory_tables import steady, table
 
 from merge_cosim.core.encounter import Encounters
+from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.pairing.pairs import extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
-from merge_cosim.ngsim.pairing.split import split_cars
+from merge_cosim.ngsim.pairing.split import folds_of, split_cars
 from merge_cosim.ngsim.sites import site
 
 US101 = site("us101")
@@ -45,3 +46,14 @@ def test_by_pair_and_by_seed(nine_cars: Encounters) -> None:
     assert len(splits) > 5
     assert split_cars(nine_cars, fraction=0).sum() == 0
     assert split_cars(nine_cars, fraction=1).all()
+
+
+def test_folds_deal_the_cars_out_evenly(nine_cars: Encounters) -> None:
+    fold = folds_of(nine_cars, 4, seed=1)
+    cars = {number: set(nine_cars.car[fold == number]) for number in range(4)}
+    assert sorted(len(one) for one in cars.values()) == [2, 2, 2, 3]
+    assert len(set.union(*cars.values())) == 9
+    order = np.random.default_rng(0).permutation(len(nine_cars))
+    np.testing.assert_array_equal(folds_of(nine_cars.take(order), 4, seed=1), fold[order])
+    with pytest.raises(UserError, match="10 folds of 9 merging cars; choose 2 to 9"):
+        folds_of(nine_cars, 10)
