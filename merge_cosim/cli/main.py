@@ -262,8 +262,9 @@ def train(
 
     if splits or folds:
         made = studies.train_ensemble(out, site=site, data=data, source=source, seed=seed, splits=splits, folds=folds)
-        rows = made.to_dict("records")
-        print_json(rows) if json else show_table(rows, f"models in {out}")
+        print_json(made.to_dict("records")) if json else show_table(
+            cast(Any, made.to_dict("records")), f"models in {out}"
+        )
         return
     trained = studies.train(out, site=site, data=data, source=source, split=split, seed=seed, everything=everything)
     report = trained.report

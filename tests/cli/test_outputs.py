@@ -160,7 +160,7 @@ def test_fcd_of_a_scene_has_all_cars_and_the_record_of_its_meetings(scene):
     for row in record:
         _, *names = row["case"].split("/")
         for role, name in zip(("host", "merging"), names, strict=True):
-            recorded = (float(row[f"{role}_x"]), float(row[f"{role}_speed"]))
+            recorded = (float(row[f"{role}_x_m"]), float(row[f"{role}_speed_m_s"]))
             assert seen[float(row["time_s"]), name] == pytest.approx(recorded, abs=ROUNDING)
 
 

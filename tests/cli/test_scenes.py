@@ -112,7 +112,8 @@ def test_one_scene_and_one_meeting_alone(minute):
     }
     trace = pd.read_csv(folder / "one.csv")
     assert set(trace["case"]) == {case["case"]}
-    assert trace["leader_gap_m"].min() == pytest.approx(case["min_leader_gap_m"]) or case["min_leader_gap_m"] is None
+    if case["min_leader_gap_m"] is not None:  # the last state is no cycle of the trace, but is scored
+        assert trace["leader_gap_m"].min() >= case["min_leader_gap_m"] > trace["leader_gap_m"].min() - 3.0
     scene = json.loads(merge_cosim(*how, "001", "--fcd", "f.xml", cwd=folder).stdout)
     stored = next(one for one in table(out / "scenes.csv") if (one["method"], one["scene"]) == ("acc", "001"))
     assert {name: str(scene[name]) for name in ("meetings", "throughput_veh_h", "two_hosts")} == {
