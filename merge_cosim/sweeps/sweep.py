@@ -138,7 +138,8 @@ def _sum_up(
         parts[CALIBRATION_CSV].append(calibration(rows))
     tables = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in parts.items()}
     tables |= scene_tables(scenes)
-    tables |= {ENSEMBLE_CSV: ensemble(tables[SUMMARY_CSV]), RIVALS_CSV: rivals(tables[SUMMARY_CSV])}
+    if len(tables[SUMMARY_CSV]):
+        tables |= {ENSEMBLE_CSV: ensemble(tables[SUMMARY_CSV]), RIVALS_CSV: rivals(tables[SUMMARY_CSV])}
     for name, table in tables.items():
         (folder.path / name).unlink(missing_ok=True)
         if len(table):
