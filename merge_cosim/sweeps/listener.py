@@ -106,4 +106,4 @@ class HostListener(StepListener):  # type: ignore[misc]
         self.world.note_absent()
         names = {"scenario": "", "variation": "", "method": self._method.name}
         names["model"] = self._model.name if self._model else ""
-        return result_rows(run, run.encounters, self._setting, self._rules.free, names).to_pandas()
+        return result_rows(run, run.encounters, self._setting, self._rules.free, names, self._model).to_pandas()
