@@ -10,19 +10,23 @@ import re
 import tempfile
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from blocks import page_parser
 from blocks import table as markdown
 
 from merge_cosim.core.encounter import Encounters, Intention
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.learned.model import MODELS, IntentionModel
+from merge_cosim.results.store import ENSEMBLE_CSV, ResultFolder
 from merge_cosim.scenarios.encounters import SourceChoice, pairs_of_site
 from merge_cosim.scenarios.sources import Pairs
-from merge_cosim.studies.training import train
+from merge_cosim.studies.training import train, train_ensemble
+from merge_cosim.sweeps.sweep import SweepRequest, sweep
 
 SPEAKS_FOR = {"YIELD": Intention.YIELD, "NOT_YIELD": Intention.NOT_YIELD}
 HEAD = """\
@@ -32,7 +36,7 @@ What the learned estimators (`pgm`, `fg` and their variants) take from data: tra
 two times to arrival, and the share of drivers that yield, separately for the merging cars that yield and those that do
 not. A model is one readable JSON file of counts in `merge_cosim/estimators/learned/models/`, with the keys of the
 merging cars it was trained on; a sweep refuses to test it on these. A sweep takes the model of its data: `us101-ngsim`
-on real data and on the designed grid, `us101-surrogate` on surrogate data; `--model FILE` takes another.
+on real data, `us101-surrogate` on surrogate data, `us101-ngsim-all` where no real pair is tested; `--model FILE` takes another.
 
 Made by `python tools/models_page.py --data DIR` with the NGSIM files in `DIR`. It trains every model again; {same}.
 """
@@ -55,6 +59,23 @@ TAIL = """\
 - Both cars drive as logged. A host that acts on the estimates gets into other situations than these.
 """
 REAL = {"ngsim": "real data", "surrogate": "surrogate"}
+LEARNED = (
+    *("pgm", "pgm-symmetric", "pgm-time", "pgm-speed", "pgm-g"),
+    *("fg", "fg-time", "fg-gmm", "fg-gmm-time", "dbn-pf", "ipcb"),
+)
+"""Methods that learn from data."""
+SPREAD = """\
+## How much depends on which cars trained a model
+
+Median over models and, in brackets, the range over models. First Designed Test II under {splits} models, each trained
+on another third of the real cars (`train --splits {splits}`), then all real pairs of US-101 under {folds} models, each
+pair tested by the one model that was not trained on its car (`train --folds {folds}`, `sweep us101-replay --set
+encounters.sites={{us101='all'}} --model FOLDER`). Cars are moved by the closed form. A difference between two methods
+that is smaller than these ranges is a difference between training cars.
+
+{designed}
+
+{replay}"""
 RULE = "slot-time"
 """The rule that the learned estimators are held against."""
 
@@ -110,7 +131,8 @@ def wrapped(text: str) -> str:
 def section(model: IntentionModel, report: dict[str, Any], trained: Encounters) -> str:
     """One model: its command, its training pairs, its judgement."""
     where = " --data DIR" if model.source == "ngsim" else ""
-    settings = f" --split {model.settings['split']} --seed {model.settings['seed']}"
+    everything = model.settings["fraction"] == 1.0
+    settings = " --all" if everything else f" --split {model.settings['split']} --seed {model.settings['seed']}"
     yielding, other = (int(model.pairs[i]) for i in SPEAKS_FOR.values())
     cars, both = shared(trained)
     rests = {
@@ -124,11 +146,53 @@ def section(model: IntentionModel, report: dict[str, Any], trained: Encounters) 
     merge-cosim train --site {model.site} --source {model.source}{where}{settings} --out {model.name}.json
 
 Rests on {rests}. Trained on {report["train_pairs"]} pairs of {report["train_cars"]} merging cars ({yielding} pairs
-YIELD, {other} NOT_YIELD; {both} of the {cars} cars stand in both classes), one third of the cars, drawn by seed
+YIELD, {other} NOT_YIELD; {both} of the {cars} cars stand in both classes), {judged(model, report)}
+"""
+
+
+def judged(model: IntentionModel, report: dict[str, Any]) -> str:
+    """Which share of the cars it was trained on, and how it does on the others."""
+    if not report["test_pairs"]:
+        return "all cars, so that none is left to judge it on. The tests without real pairs take it."
+    return f"""one third of the cars, drawn by seed
 {model.settings["seed"]}. Judged on {report["test_pairs"]} pairs of the other {report["test_cars"]} cars:
 
-{table(report["held_out"])}
-"""
+{table(report["held_out"])}"""
+
+
+def spread(data: Path, short: bool) -> str:
+    """How much of each method's result hangs on the cars that trained it."""
+    models = 2 if short else 10
+    parts = []
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        train_ensemble("us101", data, "ngsim", 0, folder / "splits", splits=models)
+        train_ensemble("us101", data, "ngsim", 0, folder / "folds", folds=models)
+        base = SweepRequest((), LEARNED[:1] if short else LEARNED, data=data, source="ngsim", world="closed-form")
+        grid = {"encounters.host_offset.step": 10, "encounters.host_speed.step": 8} if short else {}
+        everyone = {"encounters.sites": {"us101": "all"}}
+        for name, chosen, settings in (("designed-2", "splits", grid), ("us101-replay", "folds", everyone)):
+            request = replace(base, scenarios=[name], model=str(folder / chosen), settings=settings)
+            sweep(request, folder / name)
+            parts.append(ensemble_table(ResultFolder(folder / name).table(ENSEMBLE_CSV)))
+    return SPREAD.format(splits=models, folds=models, designed=parts[0], replay=parts[1])
+
+
+def ensemble_table(frame: pd.DataFrame) -> str:
+    """One row per method: failures over all models, and the median and range over models."""
+    lines = [
+        [
+            f"`{row['method']}`",
+            f"{row['n']:,}",
+            f"{row['failures']:,}",
+            *(
+                f"{row[f'{name}_median']:.2f} ({row[f'{name}_min']:.2f} to {row[f'{name}_max']:.2f})"
+                for name in ("failure_pct", "failed_or_stuck_pct", "delay_s")
+            ),
+        ]
+        for row in frame.to_dict("records")
+    ]
+    return markdown(["method", "runs", "failures", "failed %", "failed or stuck %", "delay s"], lines).rstrip()
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -144,7 +208,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         split, seed = model.settings["split"], model.settings["seed"]
         with tempfile.TemporaryDirectory() as scratch:
             again = Path(scratch) / file.name
-            report = train(model.site, data, source, split, seed, again)
+            report = train(model.site, data, source, split, seed, again, model.settings["fraction"] == 1.0)
             same.append(again.read_bytes() == file.read_bytes())
         rules = Pairs.model_validate({"kind": "pairs", "sites": {model.site: "all"}, "split": split, "seed": seed})
         pairs = pairs_of_site(model.site, rules, data, source)
@@ -154,10 +218,9 @@ def main(argv: Sequence[str] | None = None) -> None:
         sections.append(section(model, report, trained))
         wins += better(model.name, report["held_out"])
         everyone, in_both = shared(pairs)
-        both.append(
-            f"{in_both} of the {everyone} merging cars ({100 * in_both / everyone:.0f} %) of the {REAL[source]}"
-        )
-        if source == "ngsim":
+        said_of = f"{in_both} of the {everyone} merging cars ({100 * in_both / everyone:.0f} %) of the {REAL[source]}"
+        both += [said_of] if said_of not in both else []
+        if source == "ngsim" and report["held_out"]:
             frames = sum({row["distance_m"]: row["frames"] for row in report["held_out"]}.values())
             cars = report["test_cars"]
     said = (
@@ -165,7 +228,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     )
     head = HEAD.format(same=said) + "\n" + HELD_OUT
     tail = TAIL.format(both=" and ".join(both), better=", ".join(wins) or "none", frames=f"{frames:,}", cars=cars)
-    text = "\n\n".join([head.strip(), *(part.strip() for part in sections), tail.strip()])
+    text = "\n\n".join([head.strip(), *(part.strip() for part in sections), spread(data, given.short), tail.strip()])
     (given.docs / "models.md").write_text(wrapped(text) + "\n", encoding="utf-8")
 
 

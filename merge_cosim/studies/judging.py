@@ -25,7 +25,7 @@ SPEED_BAND = 5.0
 PROBABILITY_BINS = 5
 """Bins of P(NOT_YIELD) by which calibration is judged."""
 JUDGED = (
-    *("pgm", "pgm-time", "pgm-speed", "pgm-g", "fg", "fg-time"),
+    *("pgm", "pgm-symmetric", "pgm-time", "pgm-speed", "pgm-g", "fg", "fg-time"),
     *("fg-gmm", "fg-gmm-time", "fg-gmm-joint", "slot-time"),
 )
 DENSITIES = ("histogram", "gaussian", "mixture")
