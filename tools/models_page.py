@@ -36,7 +36,8 @@ What the learned estimators (`pgm`, `fg` and their variants) take from data: tra
 two times to arrival, and the share of drivers that yield, separately for the merging cars that yield and those that do
 not. A model is one readable JSON file of counts in `merge_cosim/estimators/learned/models/`, with the keys of the
 merging cars it was trained on; a sweep refuses to test it on these. A sweep takes the model of its data: `us101-ngsim`
-`us101-ngsim` on real data, `us101-surrogate` on surrogate data, `us101-ngsim-all` where no real pair is tested; `--model FILE` takes another.
+on real data, `us101-surrogate` on surrogate data, `us101-ngsim-all` where no real pair is tested; `--model FILE` takes
+another.
 
 Made by `python tools/models_page.py --data DIR` with the NGSIM files in `DIR`. It trains every model again; {same}.
 """
