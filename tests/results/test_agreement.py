@@ -7,7 +7,7 @@ from merge_cosim.results.agreement import IS_THERE, agreement
 
 
 def rows(**columns) -> pd.DataFrame:
-    names = {"scenario": "s", "variation": "", "method": "acc", "world": "sumo"}
+    names = {"scenario": "s", "variation": "", "method": "acc", "model": "", "world": "sumo"}
     return pd.DataFrame({"case": ["a", "b", "c"], **columns}).assign(**names)
 
 
