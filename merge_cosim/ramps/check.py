@@ -11,7 +11,7 @@ import sumolib
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.build import built, config
 from merge_cosim.ramps.definition import FILE_NAME, RampFile, read_ramp_file
-from merge_cosim.ramps.infer import MAX_TURN, turn
+from merge_cosim.ramps.paths import MAX_TURN, turn
 from merge_cosim.ramps.ramp import Ramp, missing_lanes, read_net
 
 MIN_UPSTREAM = 400.0

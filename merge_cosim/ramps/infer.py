@@ -3,28 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import sumolib
 
 from merge_cosim.core.errors import UserError
-
-Edge = Any
-Lane = Any
-"""sumolib's classes, which carry no types."""
+from merge_cosim.ramps.paths import (
+    CAR,
+    MAX_TURN,
+    OSM,
+    Edge,
+    Lane,
+    follow,
+    has_cars,
+    is_link,
+    lanes_into,
+    rank,
+    targets,
+    turn,
+)
 
 ROADS = ("motorway", "trunk")
 """Ends of the types of roads that an on-ramp joins (`highway.motorway` and the like)."""
-OSM = "highway."
-"""How types of OpenStreetMap begin."""
-LINK = "_link"
-"""End of a link's type."""
 MAX_ANGLE = 45.0
-"""An on-ramp joins at less than this angle [degrees]; anything else is a crossing."""
-MAX_TURN = 90.0
-"""A road goes on at less than this angle [degrees]; anything else is another road, or the way back."""
+"""An on-ramp joins at no more than this angle [degrees]; anything else is a crossing."""
+ANGLE_TOLERANCE = 0.5
+"""netconvert rounds coordinates to centimetres, and angles with them [degrees]."""
+LOOK_BACK = 50.0
+"""Beside the last metre of an on-ramp its last part of this length tells at what angle it joins [m]."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,7 @@ class Course:
             joins by a connection.
         exit: The lane that the acceleration lane leads to, if it is an exit lane.
         ending: How the acceleration lane ends, in words.
+        reasons: Why the paths are these, in words, by key of `ramp.toml`.
     """
 
     main: tuple[Lane, ...]
@@ -62,6 +70,7 @@ class Course:
     beside: tuple[Lane, ...]
     exit: Lane | None
     ending: str
+    reasons: dict[str, str]
 
 
 def joints(net: sumolib.net.Net) -> list[Joint]:
@@ -69,21 +78,18 @@ def joints(net: sumolib.net.Net) -> list[Joint]:
 
     A net with OpenStreetMap's types: a link that joins a motorway or trunk road, beside another edge. Any other net: an
     edge that joins a road of at least as many lanes and at least the same speed limit, one of them greater. Either must
-    join at an acute angle.
+    join at an acute angle and be open to cars.
     """
     typed = any(is_link(edge) or edge.getType().startswith(OSM) for edge in net.getEdges())
     found = []
     for gore in net.getEdges():
-        arriving = [edge for edge in gore.getIncoming() if abs(turn(edge, gore)) < MAX_ANGLE]
-        through = max(
-            (edge for edge in arriving if not is_link(edge)), key=lambda edge: _rank(edge, gore), default=None
-        )
+        through = _through(gore)
         if through is None or (typed and not any(edge.getType().endswith(ROADS) for edge in (through, gore))):
             continue
-        if is_link(gore):
+        if is_link(gore) or not has_cars(gore):
             continue
         joins = is_link if typed else _lesser_than(through)
-        found += [Joint(edge, through, gore) for edge in arriving if edge is not through and joins(edge)]
+        found += [Joint(edge, through, gore) for edge in _arriving(gore) if edge is not through and joins(edge)]
     return found
 
 
@@ -96,18 +102,20 @@ def joint_of(net: sumolib.net.Net, link: str) -> Joint:
     if not net.hasEdge(link):
         raise UserError(f"the net has no edge '{link}'")
     known = {joint.link.getID(): joint for joint in joints(net)}
-    edge, passed = net.getEdge(link), {link}
-    while edge.getID() not in known:
-        onward = [each for each in edge.getOutgoing() if each.getID() not in passed]
-        if len(onward) == 1 and (others := [each for each in onward[0].getIncoming() if each is not edge]):
-            through = max(others, key=lambda each: _rank(each, onward[0]))
-            if not is_link(onward[0]) and _rank(through, onward[0]) >= _rank(edge, onward[0]):
-                return Joint(edge, through, onward[0])
-        if len(onward) != 1:
-            raise UserError(f"edge '{link}' joins no road: it leads to {len(onward)} edges after '{edge.getID()}'")
-        edge = onward[0]
-        passed.add(edge.getID())
-    return known[edge.getID()]
+    ahead, seen, last = [net.getEdge(link)], {link}, net.getEdge(link)
+    while ahead:
+        last = ahead.pop(0)
+        if last.getID() in known:
+            return known[last.getID()]
+        onward = [edge for edge in last.getOutgoing() if has_cars(edge) and edge.getID() not in seen]
+        for gore in onward:
+            if (joint := _joins(last, gore)) is not None:
+                return joint
+        # Along links, or along the only edge that there is.
+        ahead += onward if len(onward) == 1 else [edge for edge in onward if is_link(edge)]
+        seen.update(edge.getID() for edge in ahead)
+    count = len(last.getOutgoing())
+    raise UserError(f"edge '{link}' joins no road: it leads to {count} edges after '{last.getID()}'")
 
 
 def course(joint: Joint, upstream: float, downstream: float) -> Course:
@@ -116,36 +124,69 @@ def course(joint: Joint, upstream: float, downstream: float) -> Course:
     Raises:
         UserError: The lanes at the gore or the acceleration lane make no merge.
     """
-    ramp_lane, gore_lane, host = _lanes_at_gore(joint)
-    main = _follow(host, downstream, _onward(avoid=gore_lane))
-    entry = min(_into(host, joint.through), key=lambda lane: int(lane.getIndex()))
-    before = _follow(entry, upstream, _back)[::-1]
-    ramp = _follow(ramp_lane, upstream, _back_along_ramp(joint, (*before, *main)))[::-1]
+    ramp_lane, gore_lane, host, why = _lanes_at_gore(joint)
+    after = follow(host, downstream, avoid=_led_to_beside(gore_lane, host))
+    gore_length = joint.gore.getLength()
+    before = follow(
+        host, upstream + gore_length, True, allowed=lambda e, on: on is not joint.gore or e is joint.through
+    )
+    back = follow(ramp_lane, upstream, True, allowed=_along_ramp(joint, (*before.lanes, *after.lanes)))
+    main = (*before.lanes[:0:-1], *after.lanes)
+    reasons = {"main": _why_main(joint, before.passed, after.passed, before.stop, after.stop), "host_lane": why}
+    ramp, count = back.lanes[::-1], len(before.lanes) - 1
     if gore_lane is host:
-        return Course((*before, *main), len(before), tuple(ramp), (), None, "")
-    beside, exit_lane, ending = _beside(gore_lane, main)
-    return Course((*before, *main), len(before), tuple(ramp), tuple(beside), exit_lane, ending)
+        return Course(main, count, ramp, (), None, "", reasons)
+    beside, exit_lane, ending = _beside(gore_lane, list(after.lanes))
+    return Course(main, count, ramp, tuple(beside), exit_lane, ending, reasons)
 
 
-def is_link(edge: Edge) -> bool:
-    """Whether an edge's type, or its name where it has no type, says that it is a link."""
-    return str(edge.getType() or edge.getName() or "").endswith(LINK)
+def _why_main(joint: Joint, joining: tuple[Edge, ...], leaving: tuple[Edge, ...], begin: str, end: str) -> str:
+    """Why the main road is this one, in words."""
+
+    def named(edges: tuple[Edge, ...]) -> str:
+        names = dict.fromkeys(f"'{edge.getID()}'" for edge in edges if edge is not joint.link)
+        return ", ".join(names)
+
+    parts = ["the same road by class, name, lanes and direction, open to cars"]
+    parts += [f"it leaves aside {named(leaving)}"] if named(leaving) else []
+    parts += [f"{named(joining)} come in before the gore"] if named(joining) else []
+    parts += [f"upstream {begin}"] if begin else []
+    parts += [f"downstream {end}"] if end else []
+    return "; ".join(parts)
 
 
-def turn(edge: Edge, onward: Edge) -> float:
-    """Change of direction from one edge's end to another's start [degrees], left positive."""
-    difference = _heading(onward.getShape()[:2]) - _heading(edge.getShape()[-2:])
-    return math.degrees((difference + math.pi) % (2.0 * math.pi) - math.pi)
+def _arriving(gore: Edge) -> list[Edge]:
+    """Edges open to cars that lead to another at an acute angle."""
+    return [edge for edge in gore.getIncoming() if has_cars(edge) and _angle(edge, gore) <= MAX_ANGLE + ANGLE_TOLERANCE]
 
 
-def _heading(segment: list[tuple[float, float]]) -> float:
-    (x, y), (further_x, further_y) = segment
-    return math.atan2(further_y - y, further_x - x)
+def _through(gore: Edge) -> Edge | None:
+    """The main road before an edge; no link."""
+    roads = (edge for edge in _arriving(gore) if not is_link(edge))
+    return max(roads, key=lambda edge: rank(edge, gore, edge), default=None)
 
 
-def _rank(edge: Edge, onward: Edge) -> tuple[bool, int, float, float]:
-    """How much an edge looks like the main road into (or out of) another: the greater the more."""
-    return not is_link(edge), edge.getLaneNumber(), edge.getSpeed(), -round(abs(turn(edge, onward)), 3)
+def _joins(link: Edge, gore: Edge) -> Joint | None:
+    """The joint of an edge that the user has named, where it joins a road of at least its own rank."""
+    others = [edge for edge in gore.getIncoming() if edge is not link and has_cars(edge) and not is_link(edge)]
+    through = max(others, key=lambda edge: rank(edge, gore, edge), default=None)
+    if through is None or is_link(gore) or abs(turn(link, gore)) > MAX_TURN or abs(turn(through, gore)) > MAX_TURN:
+        return None
+    own, other = ((not is_link(each), each.getLaneNumber(), each.getSpeed()) for each in (link, through))
+    return Joint(link, through, gore) if other >= own else None
+
+
+def _angle(edge: Edge, onward: Edge) -> float:
+    """At what angle an edge joins another [degrees]: that of its last metre, or of its last part if that is less."""
+    angle = abs(turn(edge, onward))
+    (x, y), *further = onward.getShape()[:2]
+    far = next((p for p in reversed(edge.getShape()) if math.dist(p, edge.getShape()[-1]) >= LOOK_BACK), None)
+    if far is None:
+        return angle
+    ahead = math.atan2(further[0][1] - y, further[0][0] - x)
+    end = edge.getShape()[-1]
+    part = math.degrees(math.remainder(ahead - math.atan2(end[1] - far[1], end[0] - far[0]), 2.0 * math.pi))
+    return min(angle, abs(part))
 
 
 def _lesser_than(through: Edge) -> Callable[[Edge], bool]:
@@ -156,117 +197,125 @@ def _lesser_than(through: Edge) -> Callable[[Edge], bool]:
     return joins
 
 
-def _targets(edge: Edge, onward: Edge) -> dict[int, Lane]:
-    """Lanes of `onward` that an edge leads to, by index, each with the lane that leads there."""
-    pairs = ((link.getToLane().getIndex(), link.getFromLane()) for link in edge.getOutgoing().get(onward, ()))
-    return dict(sorted(pairs))
+def _onto(edge: Edge, onward: Edge, from_right: bool) -> dict[int, Lane]:
+    """Lanes of `onward` that an edge leads to, by index, each with the lane that leads there.
+
+    A lane that is connected to several is the one nearest to its own side of the road that none of its neighbours
+    on that side leads to.
+    """
+    found: dict[int, Lane] = {}
+    lanes = edge.getLanes() if from_right else edge.getLanes()[::-1]
+    for lane in lanes:
+        leads = {each.getIndex() for each in targets(lane) if each.getEdge() is onward} if lane.allows(CAR) else set()
+        free = leads - set(found)
+        if free or leads:
+            found[(min if from_right else max)(free or leads)] = lane
+    return dict(sorted(found.items()))
 
 
-def _lanes_at_gore(joint: Joint) -> tuple[Lane, Lane, Lane]:
-    """The on-ramp's lane that merges, the lane it leads to after the gore, and the host's lane there."""
-    own, through = _targets(joint.link, joint.gore), _targets(joint.through, joint.gore)
+def _lanes_at_gore(joint: Joint) -> tuple[Lane, Lane, Lane, str]:
+    """The on-ramp's lane that merges, the lane it leads to after the gore, the host's lane there, and why."""
     gore, main = joint.gore, f"'{joint.through.getID()}'"
     where = f"edge '{joint.link.getID()}'"
+    from_right = _from_outside(joint)
+    own, through = _onto(joint.link, gore, from_right), _onto(joint.through, gore, not from_right)
+    if not own or not through:
+        raise UserError(
+            f"{where if not own else 'edge ' + main}: none of its lanes is open to cars and leads to {gore.getID()}"
+        )
     shared = sorted(set(own) & set(through))
     if shared:
         # Of several shared lanes the one furthest into the road; of two on-ramp lanes the one that merges.
         lane = shared[-1] if min(own) <= min(through) else shared[0]
-        return own[lane], gore.getLane(lane), gore.getLane(lane)
-    from_right = max(own) < min(through)
-    if not from_right and min(own) < max(through):
+        why = f"lane {lane} of '{gore.getID()}' is the one that the on-ramp's lane {own[lane].getID()} joins"
+        return own[lane], gore.getLane(lane), gore.getLane(lane), why
+    if not max(own) < min(through) and min(own) < max(through):
         raise UserError(f"{where} comes in between the lanes of {main}, neither right nor left of them")
-    lane = max(own) if from_right else min(own)
-    host = lane + 1 if from_right else lane - 1
+    right = max(own) < min(through)
+    lane = max(own) if right else min(own)
+    host = lane + 1 if right else lane - 1
     if host not in through:
         raise UserError(f"{where}: no lane of {main} leads to the lane beside it, {gore.getID()}_{host}")
-    return own[lane], gore.getLane(lane), gore.getLane(host)
+    why = f"lane {host} of '{gore.getID()}' is the main road's lane beside the acceleration lane {gore.getID()}_{lane}"
+    return own[lane], gore.getLane(lane), gore.getLane(host), why
+
+
+def _from_outside(joint: Joint) -> bool:
+    """Whether the on-ramp comes from the side of lane 0: the right, or the left where traffic keeps left.
+
+    By the connections, or by the shapes where both edges lead to the same lanes.
+    """
+    indices = [
+        sorted(link.getToLane().getIndex() for link in edge.getOutgoing().get(joint.gore, ()))
+        for edge in (joint.link, joint.through)
+    ]
+    if all(indices) and (min(indices[0]), max(indices[0])) != (min(indices[1]), max(indices[1])):
+        ((low, high), (through_low, through_high)) = ((found[0], found[-1]) for found in indices)
+        if low < through_low or high > through_high:
+            return bool(low < through_low)
+    ends = [edge.getShape() for edge in (joint.link, joint.through)]
+    far = next((p for p in reversed(ends[0]) if math.dist(p, ends[0][-1]) >= LOOK_BACK), ends[0][0])
+    (x, y), (end_x, end_y) = ends[1][-2:]
+    side = (end_x - x) * (far[1] - end_y) - (end_y - y) * (far[0] - end_x)
+    return bool((side > 0.0) == keeps_left(joint.gore))
+
+
+def keeps_left(edge: Edge) -> bool:
+    """Whether traffic keeps left: lane 0 lies left of the others, or, on one lane, is not known."""
+    lanes = edge.getLanes()
+    if len(lanes) < 2:
+        return False
+    (x, y), (next_x, next_y) = lanes[0].getShape()[:2]
+    other = lanes[-1].getShape()[0]
+    return bool((next_x - x) * (other[1] - y) - (next_y - y) * (other[0] - x) < 0.0)
 
 
 def _beside(lane: Lane, main: list[Lane]) -> tuple[list[Lane], Lane | None, str]:
     """Follow the on-ramp's lane beside the host's until it ends; also the exit lane it leads to, and how it ends."""
     beside = [lane]
     for onward in main[1:]:
-        targets = [link.getToLane() for link in beside[-1].getOutgoing()]
-        further = [each for each in targets if each.getEdge() is onward.getEdge() and each is not onward]
+        leads = targets(beside[-1])
+        further = [each for each in leads if each.getEdge() is onward.getEdge() and each is not onward]
         if not further:
-            out = next((each for each in targets if each.getEdge() is not onward.getEdge()), None)
+            out = next((each for each in leads if each.getEdge() is not onward.getEdge()), None)
             if out is not None:
                 return beside, out, f"leads to the exit {out.getID()}"
-            return beside, None, "joins the host's lane" if targets else "ends"
+            return beside, None, "joins the host's lane" if leads else "ends"
         if abs(further[0].getIndex() - onward.getIndex()) != 1:
             return beside, None, "is no longer beside the host's"
         beside.append(further[0])
     length = sum(each.getLength() for each in beside)
-    keeps_left = "; left-hand traffic cannot be read" if lane.getIndex() > main[0].getIndex() else ""
     raise UserError(
         f"the on-ramp's lane {lane.getID()} goes on beside the road for {length:.0f} m, as far as was looked or the "
-        f"net reaches: no car has to merge; take a larger extract if it ends further on{keeps_left}"
+        f"net reaches: no car has to merge; take a larger extract if it ends further on"
     )
 
 
-def _follow(lane: Lane, reach: float, step: Callable[[Lane], Lane | None]) -> list[Lane]:
-    """Lanes from `lane` on, step by step, until they are `reach` metres long together."""
-    lanes, edges = [lane], {lane.getEdge().getID()}
-    while sum(each.getLength() for each in lanes) < reach:
-        onward = step(lanes[-1])
-        if onward is None or onward.getEdge().getID() in edges:
-            break
-        lanes.append(onward)
-        edges.add(onward.getEdge().getID())
-    return lanes
+def _led_to_beside(gore_lane: Lane, host: Lane) -> Callable[[Lane], bool]:
+    """Whether the lane beside the host's, on the on-ramp's side, leads to a lane."""
+    side = gore_lane.getIndex() - host.getIndex()
+
+    def taken(lane: Lane) -> bool:
+        before = lanes_into(lane)
+        return any(
+            lower is not upper
+            and lower.getEdge() is upper.getEdge()
+            and (lower.getIndex() - upper.getIndex()) * side > 0
+            for lower in before
+            for upper in before
+        )
+
+    return taken if side else lambda lane: False
 
 
-def _onward(avoid: Lane) -> Callable[[Lane], Lane | None]:
-    """Step to the next lane of the main road; a lane that the on-ramp's lane leads to is taken last."""
-
-    def step(lane: Lane) -> Lane | None:
-        side = lane.getEdge().getLanes()
-        right = avoid.getIndex() < lane.getIndex()
-        beside = lane.getIndex() - 1 if right else lane.getIndex() + 1
-        taken = {link.getToLane() for link in side[beside].getOutgoing()} if 0 <= beside < len(side) else set()
-        targets = [link.getToLane() for link in lane.getOutgoing()]
-        return _best([each for each in targets if each not in taken] or targets, lane, "after")
-
-    return step
-
-
-def _back(lane: Lane) -> Lane | None:
-    return _best(_into(lane, *lane.getEdge().getIncoming()), lane, "before")
-
-
-def _back_along_ramp(joint: Joint, path: Iterable[Lane]) -> Callable[[Lane], Lane | None]:
-    """Step back on the on-ramp, up to a crossing, the main road, or the end of the links."""
+def _along_ramp(joint: Joint, path: tuple[Lane, ...]) -> Callable[[Edge, Edge], bool]:
+    """Whether an on-ramp goes from one edge to another: not over a crossing or the main road, nor beyond the links."""
     main = {lane.getEdge().getID() for lane in path}
 
-    def step(lane: Lane) -> Lane | None:
-        node = lane.getEdge().getFromNode()
-        if len(node.getIncoming()) > 1 and len(node.getOutgoing()) > 1:
-            return None
-        before = _back(lane)
-        if before is None or before.getEdge().getID() in main:
-            return None
-        return before if is_link(before.getEdge()) or not is_link(joint.link) else None
+    def allowed(edge: Edge, onward: Edge) -> bool:
+        node = onward.getFromNode()
+        if (len(node.getIncoming()) > 1 and len(node.getOutgoing()) > 1) or edge.getID() in main:
+            return False
+        return is_link(edge) or not is_link(joint.link)
 
-    return step
-
-
-def _into(lane: Lane, *edges: Edge) -> list[Lane]:
-    """Lanes of the given edges that lead to a lane."""
-    target = lane.getEdge()
-    return [
-        link.getFromLane() for edge in edges for link in edge.getOutgoing().get(target, ()) if link.getToLane() is lane
-    ]
-
-
-def _best(lanes: Iterable[Lane], lane: Lane, where: str) -> Lane | None:
-    """The lane whose edge looks most like the same road; of several on one edge the right-most."""
-
-    def angle(other: Lane) -> float:
-        pair = (other.getEdge(), lane.getEdge())
-        return abs(turn(*pair) if where == "before" else turn(*reversed(pair)))
-
-    def rank(other: Lane) -> tuple[bool, int, int, int]:
-        edge = other.getEdge()
-        return not is_link(edge), -round(angle(other)), edge.getLaneNumber(), -other.getIndex()
-
-    return max((other for other in lanes if angle(other) < MAX_TURN), key=rank, default=None)
+    return allowed

@@ -5,7 +5,7 @@ from test_ramp import NAMES, copy_with
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
-from merge_cosim.ramps.build import build
+from merge_cosim.ramps.build import build, netconvert
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -27,3 +27,15 @@ def test_what_netconvert_refuses_is_one_line(tmp_path: Path) -> None:
     (folder / "designed.netccfg").unlink()
     with pytest.raises(UserError, match="0 files"):
         build(folder)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_sources_keep_to_sumos_schemas(tmp_path: Path, name: str) -> None:
+    """The root elements name the schemas, so that netconvert validates the files; a wrong attribute is refused."""
+    folder = copy_with(tmp_path, "title", "title", name)
+    options = ("--xml-validation", "local", "-o", str(tmp_path / "out.net.xml"))
+    netconvert(folder, "-c", str(folder / f"{name}.netccfg"), *options)
+    nodes = folder / f"{name}.nod.xml"
+    nodes.write_text(nodes.read_text(encoding="utf-8").replace(' type="', ' tpye="'), encoding="utf-8")
+    with pytest.raises(UserError, match="attribute 'tpye' is not declared"):
+        netconvert(folder, "-c", str(folder / f"{name}.netccfg"), *options)

@@ -8,6 +8,7 @@ import numpy as np
 
 from geometry.lines import FloatArray
 from geometry.plan import Edge, Plan
+from merge_cosim.ramps.create.folder import opening
 from merge_cosim.ramps.view import ROLES
 
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -82,7 +83,7 @@ def _connections(plan: Plan) -> str:
 
 
 def _document(root: str, rows: list[str]) -> str:
-    return "\n".join([f"<{root}>", *rows, f"</{root}>"]) + "\n"
+    return "\n".join([opening(root), *rows, f"</{root}>"]) + "\n"
 
 
 def _points(points: FloatArray, between: str = " ") -> str:

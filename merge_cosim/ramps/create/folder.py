@@ -60,8 +60,14 @@ def write_ramp(folder: Path, nodes: str, edges: str, connections: str, definitio
 
 def document(root: str, comment: str, rows: list[str]) -> str:
     """A plain XML file with one comment at its head."""
-    lines = [f"<{root}>", f"    <!-- {comment} -->", *(f"    {row}" for row in rows), f"</{root}>"]
+    lines = [opening(root), f"    <!-- {comment} -->", *(f"    {row}" for row in rows), f"</{root}>"]
     return HEAD + "\n".join(lines) + "\n"
+
+
+def opening(root: str) -> str:
+    """First tag of a plain XML file; it names SUMO's schema, so that netconvert and editors can validate the file."""
+    schema = f"http://sumo.dlr.de/xsd/{root}_file.xsd"
+    return f'<{root} xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="{schema}">'
 
 
 def definition_text(file: RampFile) -> str:

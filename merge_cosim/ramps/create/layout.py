@@ -10,7 +10,8 @@ import numpy as np
 
 from merge_cosim.core.units import FloatArray
 from merge_cosim.ramps import polyline
-from merge_cosim.ramps.infer import Course, Edge, Lane
+from merge_cosim.ramps.infer import Course
+from merge_cosim.ramps.paths import Edge, Lane
 
 EXIT_LENGTH = 300.0
 """As much of an off-ramp is kept [m]."""

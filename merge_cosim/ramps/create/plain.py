@@ -10,7 +10,8 @@ from sumolib.net.lane import SUMO_VEHICLE_CLASSES, SUMO_VEHICLE_CLASSES_DEPRECAT
 from merge_cosim.core.units import FloatArray
 from merge_cosim.ramps.create.folder import document
 from merge_cosim.ramps.create.layout import Layout, Road, nodes
-from merge_cosim.ramps.infer import Course, Lane
+from merge_cosim.ramps.infer import Course
+from merge_cosim.ramps.paths import Lane
 from merge_cosim.ramps.view import ROLES
 
 CLASSES = SUMO_VEHICLE_CLASSES - SUMO_VEHICLE_CLASSES_DEPRECATED

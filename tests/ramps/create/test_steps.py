@@ -14,7 +14,8 @@ from merge_cosim.ramps.create.onramp import Origin, choose, read_source, sources
 from merge_cosim.ramps.create.plain import PlainXml
 from merge_cosim.ramps.create.start import found
 from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
-from merge_cosim.ramps.infer import course, is_link, joint_of, joints
+from merge_cosim.ramps.infer import course, joint_of, joints
+from merge_cosim.ramps.paths import is_link
 
 GAME = Path(sumo.SUMO_HOME) / "tools" / "game" / "ramp" / "ramp.net.xml"
 
