@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -56,3 +57,18 @@ def grid_of(count: int, across: int, cell: tuple[float, float], sharex: bool = T
     for above in axes[max(count - across, 0) : count]:
         above.tick_params(labelbottom=True)
     return figure, axes[:count]
+
+
+def broken(name: str, most: int = 18) -> str:
+    """A long name in two lines, parted where it has a dash or a plus near its middle."""
+    if len(name) <= most:
+        return name
+    places = [i for i, sign in enumerate(name) if sign in "-+_"] or [len(name) // 2]
+    place = min(places, key=lambda i: abs(i - len(name) // 2))
+    return f"{name[:place]}\n{name[place:]}"
+
+
+def columns_for(labels: Sequence[str], figure: Figure) -> int:
+    """Columns of a legend below a figure in which the longest label fits."""
+    width = 0.085 * mpl.rcParams["legend.fontsize"] / 8.0 * max(map(len, labels), default=1) + 0.5
+    return max(1, min(4, int(figure.get_figwidth() / width)))

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from merge_cosim.core.units import FloatArray
+from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look, in_order
 from merge_cosim.results.statistics.summary import ALL_SITES, AMBIGUITY_EDGES
 
-CELL = (1.8, 1.9)
+CELL, ALONE = (1.8, 1.9), (4.2, 3.4)
+"""Size of one small panel [in], and of the only one."""
 SHOWN = 0.95
 """Share of the cases inside the axes, of those in which the host arrived; the rest is drawn at the edges."""
 LEAST_RANGE = 1.0
@@ -23,8 +25,48 @@ MOST_SPEEDS = 40
 """With more different speeds than this a failure map has classes of speeds."""
 CLASSES, CASES_EACH = (1.0, 2.0, 5.0), 5
 """Widths of these classes [m/s]: the smallest that leaves so many cases for each pair of them."""
+LEAST_TOP = 1.0
+"""Smallest upper end of an axis of failures [%]."""
 MOST_NUMBERS = 24
 """Most bars that carry their number."""
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Counts of cases by both initial speeds.
+
+    Attributes:
+        hosts, mergings: The speeds, or the middles of their classes [m/s], ascending.
+        n, failed, absent: For each method the cases of a cell, those that failed, and those whose host did not arrive
+            in time, shape (hosts, mergings).
+    """
+
+    hosts: FloatArray
+    mergings: FloatArray
+    n: dict[str, IntArray]
+    failed: dict[str, IntArray]
+    absent: dict[str, IntArray]
+
+
+def failure_shares(results: pd.DataFrame) -> Shares:
+    """Count the failures of each method by both initial speeds, in classes where there are many speeds.
+
+    Args:
+        results: Rows of one scenario.
+    """
+    speeds = results[["host_speed_0", "merging_speed_0"]].set_axis(["host", "merging"], axis=1)
+    if speeds.nunique().max() > MOST_SPEEDS:
+        speeds = _classes(speeds, len(results) / results["method"].nunique())
+    hosts, host = np.unique(speeds["host"].to_numpy(dtype=float), return_inverse=True)
+    mergings, merging = np.unique(speeds["merging"].to_numpy(dtype=float), return_inverse=True)
+    cell = host * len(mergings) + merging
+    counts: tuple[dict[str, IntArray], ...] = ({}, {}, {})
+    for method in in_order(results["method"]):
+        own = (results["method"] == method).to_numpy()
+        marks = own, own & results["failed"].to_numpy(dtype=bool), own & ~results["host_reached"].to_numpy(dtype=bool)
+        for found, mark in zip(counts, marks, strict=True):
+            found[method] = np.bincount(cell[mark], minlength=len(hosts) * len(mergings)).reshape(len(hosts), -1)
+    return Shares(hosts, mergings, *counts)
 
 
 def failure_map(results: pd.DataFrame) -> Figure:
@@ -35,29 +77,25 @@ def failure_map(results: pd.DataFrame) -> Figure:
     Args:
         results: Rows of one scenario.
     """
-    speeds = results[["host_speed_0", "merging_speed_0"]].set_axis(["host", "merging"], axis=1)
-    if speeds.nunique().max() > MOST_SPEEDS:
-        speeds = _classes(speeds, len(results) / results["method"].nunique())
-    rows = speeds.assign(method=results["method"], failed=results["failed"], absent=~results["host_reached"])
-    methods = in_order(rows["method"])
-    shares = {method: _by_speeds(rows[rows["method"] == method], "failed") for method in methods}
-    top = max(max(float(np.nanmax(share.to_numpy())) for share in shares.values()), 1e-3)
+    shares = failure_shares(results)
+    parts = {
+        method: np.divide(failed, shares.n[method], out=np.full(failed.shape, np.nan), where=shares.n[method] > 0)
+        for method, failed in shares.failed.items()
+    }
+    top = max(max(float(np.nanmax(part)) for part in parts.values()), 1e-3)
+    edges = _edges(shares.mergings), _edges(shares.hosts)
     with canvas.style():
-        figure, axes = canvas.grid_of(len(methods), 4, CELL)
-        for ax, (method, share) in zip(axes, shares.items(), strict=True):
-            x, y = share.columns.to_numpy(dtype=float), share.index.to_numpy(dtype=float)
-            image = ax.pcolormesh(
-                _edges(x), _edges(y), 100 * share.to_numpy(), vmin=0, vmax=100 * top, cmap="YlOrRd", rasterized=True
-            )
-            absent = _by_speeds(rows[rows["method"] == method], "absent").fillna(0.0).to_numpy()
-            row, column = np.nonzero(absent)
-            ax.scatter(x[column], y[row], s=1.2, color="#333333", linewidths=0)
-            ax.set_title(method)
+        figure, axes = canvas.grid_of(len(parts), 4, CELL if len(parts) > 1 else ALONE)
+        for ax, (method, part) in zip(axes, parts.items(), strict=True):
+            image = ax.pcolormesh(*edges, 100 * part, vmin=0, vmax=100 * top, cmap="YlOrRd", linewidth=0)
+            row, column = np.nonzero(shares.absent[method])
+            ax.scatter(shares.mergings[column], shares.hosts[row], s=1.2, color="#333333", linewidths=0)
+            ax.set_title(canvas.broken(method))
             ax.grid(False)
             ax.set_aspect("auto")
-        figure.supxlabel("merging car's initial speed [m/s]", fontsize=9)
-        figure.supylabel("host's initial speed [m/s]", fontsize=9)
-        figure.colorbar(image, ax=axes, label="failed cases [%]", shrink=0.7, aspect=25)
+        figure.supxlabel("merging car's initial speed [m/s]", fontsize="medium")
+        figure.supylabel("host's initial speed [m/s]", fontsize="medium")
+        figure.colorbar(image, ax=axes, label="failed cases [%]", shrink=0.9 if len(parts) > 4 else 1.0, aspect=25)
     return figure
 
 
@@ -80,11 +118,11 @@ def ambiguity_figure(results: pd.DataFrame, looks: Mapping[str, Look]) -> Figure
             ax.scatter(x[failed], y[failed], s=26, marker="x", color=canvas.FAILED, linewidths=1.3, zorder=4)
             for edge in AMBIGUITY_EDGES[1:-1]:
                 ax.axvline(edge, color="#bbbbbb", lw=0.8, zorder=0)
-            ax.set_title(method)
+            ax.set_title(canvas.broken(method))
         axes[0].set_xlim(0.0, right * 1.04)
         axes[0].set_ylim(top=top * 1.06)
-        figure.supxlabel("$|T_m - T_h|$ at the start [s]", fontsize=9)
-        figure.supylabel("delay [s]", fontsize=9)
+        figure.supxlabel("$|T_m - T_h|$ at the start [s]", fontsize="medium")
+        figure.supylabel("delay [s]", fontsize="medium")
     return figure
 
 
@@ -126,11 +164,17 @@ def variation_figure(summary: pd.DataFrame, parameter: str, looks: Mapping[str, 
                 ax.grid(axis="x", visible=False)
             ax.set_title(f"{site} ({source})" if len(parts) > 1 else "")
             ax.set_xlabel(parameter)
-        axes[0].set_ylim(bottom=0.0)
+        axes[0].set_ylim(0.0, _top(varied))
         axes[0].set_ylabel("failures [%]")
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        figure.legend(handles, labels, loc="outside lower center", ncols=canvas.columns_for(labels, figure))
     return figure
+
+
+def _top(varied: pd.DataFrame) -> float:
+    """Upper end of the axis of failures [%]: above every point, interval and number."""
+    highest = varied[["failure_pct", "ci_high_pct"]].to_numpy(dtype=float)
+    return 1.12 * max(float(np.nanmax(highest, initial=0.0)), LEAST_TOP)
 
 
 def _bars(ax: Any, i: int, n: int, rate: FloatArray, low: FloatArray, high: FloatArray, look: Look, name: str) -> None:
@@ -149,10 +193,6 @@ def _classes(speeds: pd.DataFrame, cases: float) -> pd.DataFrame:
     area = float(np.prod(np.ptp(speeds.to_numpy(dtype=float), axis=0)))
     width = next((one for one in CLASSES if area / one**2 * CASES_EACH <= cases), CLASSES[-1])
     return (speeds // width + 0.5) * width
-
-
-def _by_speeds(rows: pd.DataFrame, column: str) -> pd.DataFrame:
-    return rows.pivot_table(index="host", columns="merging", values=column, aggfunc="mean")
 
 
 def _edges(middles: FloatArray) -> FloatArray:

@@ -10,11 +10,12 @@ from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ngsim.sites import site
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.report import belief_figures, case_figures, model_figures
+from merge_cosim.report.chapters import SOURCES
 from merge_cosim.report.columns import Table
 from merge_cosim.report.export import write_tables
 from merge_cosim.report.html import Picture, render
 from merge_cosim.report.methods import Look, looks
-from merge_cosim.report.page import SOURCES, write_report
+from merge_cosim.report.page import write_report
 from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER
 from merge_cosim.studies.papers import cases, claims, figures, tables
 from merge_cosim.studies.papers.evidence import Evidence, gather

@@ -1,0 +1,154 @@
+"""The chapters of a report: one for each scenario, site and source of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from merge_cosim.report import measure_tables, page_data, tables
+from merge_cosim.report.columns import Table
+from merge_cosim.report.methods import in_order
+from merge_cosim.report.published import PUBLISHED
+from merge_cosim.report.tables import Section
+from merge_cosim.results.statistics.summary import ALL_SITES
+from merge_cosim.results.statistics.verdict import Verdict
+
+SOURCES = {
+    "ngsim": "real NGSIM data",
+    "recorded": "real recorded data",
+    "surrogate": "SYNTHETIC surrogate data, made by SUMO, not real",
+    "designed": "designed initial states, no data",
+    "random": "random initial states, no data",
+    "traffic": "SUMO's own traffic, no data",
+}
+"""What each source is called in headings."""
+NO_SITES = ("designed", "random", "traffic")
+"""Sources whose cases are not from a site's data."""
+MAPPED = ("grid", "random", "drawn")
+"""Kinds of encounters whose initial speeds fill a plane, so that there is a failure map."""
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """What the page says about one section.
+
+    Attributes:
+        key: Its id in the page.
+        section: What it is about.
+        title, source, about: Its heading, the source in words, and the scenario's own description.
+        verdict: Which method is best, and how sure that is.
+        rows: The numbers of the chart and of the short table, one entry per method.
+        notes: What a reader must know beside them.
+        tables: All tables by name.
+        data: What the scripts draw.
+    """
+
+    key: str
+    section: Section
+    title: str
+    source: str
+    about: str
+    verdict: Verdict
+    rows: list[dict[str, Any]]
+    notes: list[str]
+    tables: dict[str, Table]
+    data: dict[str, Any]
+
+    @property
+    def has_interval(self) -> bool:
+        """The cases are a sample, so that rates have intervals."""
+        return any(row["failed_low"] is not None for row in self.rows)
+
+    @property
+    def has_stuck(self) -> bool:
+        """At least one host never arrived."""
+        return any(row["stuck"] for row in self.rows)
+
+
+def chapter(
+    number: int,
+    section: Section,
+    results: pd.DataFrame,
+    summary: pd.DataFrame,
+    manifest: dict[str, Any],
+    said: Verdict,
+    recorded: Sequence[dict[str, Any]],
+) -> Chapter:
+    """Gather what the page says about a section.
+
+    Args:
+        number: Its place in the page, from 1 on.
+        section: What it is about.
+        results: All result rows.
+        summary: All summary rows.
+        manifest: The sweep's manifest.
+        said: The verdict of this section.
+        recorded: All recorded cases.
+    """
+    rows = section.of(results)
+    scenario = manifest["scenarios"][section.scenario]
+    kind = scenario["encounters"]["kind"]
+    found = {
+        "outcome": tables.main_table(summary, section),
+        "ambiguity": tables.strata_table(results, section),
+        "safety": measure_tables.safety_table(summary, section),
+    }
+    beliefs = measure_tables.belief_table(results, section)
+    if beliefs is not None:
+        found["belief"] = beliefs
+    own = set(rows["case"])
+    outcome = page_data.outcome_rows(tables.of_section(summary, section), rows, said)
+    data = {
+        "rows": outcome,
+        "map": page_data.map_data(rows) if kind in MAPPED else None,
+        "delays": page_data.delay_data(rows) if kind != "grid" else None,
+        "beliefs": page_data.belief_data(rows, section.site) if beliefs is not None else None,
+        "cases": [i for i, one in enumerate(recorded) if one["scenario"] == section.scenario and one["case"] in own],
+    }
+    site = "all sites" if section.site == ALL_SITES else section.site
+    return Chapter(
+        key=f"t{number}",
+        section=section,
+        title=scenario["title"] if section.source in NO_SITES else f"{scenario['title']}, {site}",
+        source=SOURCES.get(section.source, section.source),
+        about=" ".join(scenario["about"].split()),
+        verdict=said,
+        rows=outcome,
+        notes=_notes(section, rows, scenario, manifest),
+        tables=found,
+        data=data,
+    )
+
+
+def _notes(section: Section, rows: pd.DataFrame, scenario: dict[str, Any], manifest: dict[str, Any]) -> list[str]:
+    notes = []
+    models = rows[rows["model"] != ""].groupby("model")["method"].unique()
+    notes += [f"Model {model}: {', '.join(in_order(methods))}." for model, methods in models.items()]
+    if section.source == "surrogate":
+        notes.append("Every pair is made by SUMO, also where the text above speaks of a log: no real car is in it.")
+    if section.source not in NO_SITES and scenario["merging"]["model"] != "replay":
+        notes.append(
+            f"Only the initial states come from {SOURCES.get(section.source, section.source)}; the merging car drives "
+            f"by the model '{scenario['merging']['model']}'."
+        )
+    left_out = manifest.get("left_out", {}).get(section.scenario, [])
+    if left_out:
+        notes.append(f"{len(left_out)} cases of the scenario do not fit on the ramp and were left out.")
+    if rows["smoothed_source"].any():
+        smoothed = rows.drop_duplicates("case")["smoothed_source"].sum()
+        notes.append(
+            f"{smoothed} of the {rows['case'].nunique()} cases come from tracks that were smoothed at the source."
+        )
+    absent = {k: v for k, v in PUBLISHED.get(section.scenario, {}).items() if k not in set(rows["method"])}
+    if absent:
+        figures = ", ".join(
+            f"{method} {figure.failure_pct} %" + (f" (D {figure.distance_m} m)" if figure.distance_m else "")
+            for method, figure in absent.items()
+        )
+        notes.append(f"Published, but not run here: {figures}.")
+    if section.scenario == "designed-1" and section.site != ALL_SITES:
+        notes.append("The published figures are over both sites together.")
+    return notes

@@ -1,0 +1,191 @@
+"""What the scripts of the page draw, as plain JSON values: trade-off, failure maps, delays, beliefs, variations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import pandas as pd
+
+from merge_cosim.report.methods import Look, in_order
+from merge_cosim.report.set_figures import failure_shares
+from merge_cosim.results.statistics import belief, calibration
+from merge_cosim.results.statistics.rates import bootstrap_means
+from merge_cosim.results.statistics.summary import ALL_STARTS, AMBIGUITY_EDGES, is_sample
+from merge_cosim.results.statistics.verdict import Verdict
+from merge_cosim.scenarios.methods import is_reference
+
+MOST_DOTS = 1_500
+"""Cases of a sample whose delays are drawn; of more, every k-th and all that failed."""
+CALIBRATED_AT = 40
+"""Distance of the merging car [m] at which calibration is drawn."""
+
+
+def method_looks(looks: Mapping[str, Look]) -> dict[str, Any]:
+    """Colour of each method, and whether it is a reference, which is drawn hollow."""
+    return {
+        name: {"color": look.color, "reference": is_reference(name), "order": place}
+        for place, (name, look) in enumerate((name, looks[name]) for name in in_order(looks))
+    }
+
+
+def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, said: Verdict) -> list[dict[str, Any]]:
+    """One entry per method, the best first and references last: the numbers of the chart and of the short table.
+
+    Args:
+        summary: Summary rows of one section.
+        rows: Its result rows.
+        said: Its verdict.
+    """
+    order = {method: place for place, method in enumerate(said.order)}
+    found = []
+    for row in summary.to_dict("records"):
+        method = str(row["method"])
+        own = rows[rows["method"] == method]
+        low, high = _delay_interval(own)
+        found.append(
+            {
+                "method": method,
+                "reference": is_reference(method),
+                "best": method in said.best and len(said.order) > 1,
+                "undecided": method in said.undecided and method not in said.best,
+                "n": int(row["n"]),
+                "failed": int(row["failures"]),
+                "stuck": int(row["stuck"]),
+                "failed_pct": number(row["failure_pct"]),
+                "failed_low": number(row["ci_low_pct"]),
+                "failed_high": number(row["ci_high_pct"]),
+                "bad_pct": number(row["failed_or_stuck_pct"]),
+                "bad_low": number(row["failed_or_stuck_low_pct"]),
+                "bad_high": number(row["failed_or_stuck_high_pct"]),
+                "delay": number(row["delay_s"], 6),
+                "delay_low": number(low, 6),
+                "delay_high": number(high, 6),
+                "distance": number(row["distance_m"], 6),
+            }
+        )
+    worst = len(order)
+    return sorted(
+        found,
+        key=lambda one: (
+            one["reference"],
+            order.get(one["method"], worst),
+            math.inf if one["bad_pct"] is None else one["bad_pct"],
+            one["method"],
+        ),
+    )
+
+
+def map_data(rows: pd.DataFrame) -> dict[str, Any]:
+    """Failure maps: the speeds of both axes, and for each method its failed, absent and all cases of every cell.
+
+    The cells of a method are a flat list, merging speeds first.
+    """
+    shares = failure_shares(rows)
+    return {
+        "hosts": shares.hosts.tolist(),
+        "mergings": shares.mergings.tolist(),
+        "failed": {method: counts.ravel().tolist() for method, counts in shares.failed.items()},
+        "absent": {method: counts.ravel().tolist() for method, counts in shares.absent.items()},
+        "n": {method: counts.ravel().tolist() for method, counts in shares.n.items()},
+    }
+
+
+def delay_data(rows: pd.DataFrame) -> dict[str, Any]:
+    """Delay of each case against how ambiguous its start was, by method, with what failed."""
+    cases = rows.drop_duplicates("case")
+    step = -(-len(cases) // MOST_DOTS)
+    kept = set(cases["case"].iloc[::step]) | set(rows.loc[rows["failed"], "case"].iloc[:MOST_DOTS])
+    shown = rows[rows["case"].isin(kept)]
+    return {
+        "edges": [edge for edge in AMBIGUITY_EDGES[1:] if math.isfinite(edge)],
+        "shown": len(kept),
+        "all": len(cases),
+        "methods": {
+            method: {
+                "x": shown.loc[own, "ambiguity_s"].round(2).tolist(),
+                "y": [number(value, 2) for value in shown.loc[own, "delay_s"]],
+                "failed": shown.loc[own, "failed"].astype(int).tolist(),
+            }
+            for method in in_order(shown["method"])
+            for own in [shown["method"] == method]
+        },
+    }
+
+
+def belief_data(rows: pd.DataFrame, site: str) -> dict[str, Any] | None:
+    """Share of right decisions by distance, and calibration at one distance; None where no case has a label."""
+    found = belief(rows)
+    if not len(found):
+        return None
+    right = _of_site(found[found["start"] == ALL_STARTS], site)
+    sure = calibration(rows)
+    sure = _of_site(sure[sure["gate_m"] == CALIBRATED_AT], site) if len(sure) else sure
+    return {
+        "at": CALIBRATED_AT,
+        "right": [
+            {"name": method, "x": part["gate_m"].tolist(), "y": part["accuracy_pct"].tolist()}
+            for method, part in _by_method(right)
+        ],
+        "calibration": [
+            {
+                "name": method,
+                "x": (100 * part["mean_belief"]).round(2).tolist(),
+                "y": (100 * part["not_yield_share"]).round(2).tolist(),
+                "n": part["n"].tolist(),
+            }
+            for method, part in _by_method(sure)
+        ],
+    }
+
+
+def variation_data(summary: pd.DataFrame, scenario: str, parameter: str) -> list[dict[str, Any]]:
+    """Failures by the values of a varied parameter: a plot per source and site, a series per method."""
+    rows = summary[summary["scenario"] == scenario]
+    rows = rows.assign(value=rows["variation"].str.partition("=")[2])
+    varied = rows[rows["variation"].str.startswith(f"{parameter}=")]
+    plots = []
+    for (source, site), part in varied.groupby(["source", "site"]):
+        values = part["value"].drop_duplicates().tolist()
+        numbers = pd.to_numeric(pd.Series(values), errors="coerce")
+        scale = bool(numbers.notna().all())
+        series = []
+        for method, own in _by_method(part):
+            place = own["value"].map(dict(zip(values, numbers if scale else range(len(values)), strict=True)))
+            own = own.assign(place=place.astype(float)).sort_values("place")
+            series.append(
+                {
+                    "name": method,
+                    "x": own["place"].tolist(),
+                    "y": [number(value) for value in own["failure_pct"]],
+                    "low": [number(value) for value in own["ci_low_pct"]],
+                    "high": [number(value) for value in own["ci_high_pct"]],
+                }
+            )
+        plots.append(
+            {"source": source, "site": site, "parameter": parameter, "series": series}
+            | {"values": [] if scale else values}
+        )
+    return plots
+
+
+def number(value: Any, decimals: int = 4) -> float | None:
+    """A number for JSON; None where it is missing."""
+    return None if value is None or pd.isna(value) else round(float(value), decimals)
+
+
+def _delay_interval(rows: pd.DataFrame) -> tuple[float | None, float | None]:
+    if not len(rows) or not is_sample(rows):
+        return None, None
+    clusters = rows["car"] if bool((rows["car"] != "").all()) else rows["case"]
+    return bootstrap_means(rows[["delay_s"]], clusters)[0]
+
+
+def _by_method(frame: pd.DataFrame) -> Iterable[tuple[str, pd.DataFrame]]:
+    parts = dict(list(frame.groupby("method"))) if len(frame) else {}
+    return [(method, parts[method]) for method in in_order(map(str, parts))]
+
+
+def _of_site(frame: pd.DataFrame, site: str) -> pd.DataFrame:
+    return frame[(frame["site"] == site) | (frame["site"].nunique() == 1)]

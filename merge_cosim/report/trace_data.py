@@ -1,0 +1,97 @@
+"""Recorded cases as plain JSON values for the page's case viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from merge_cosim.report.methods import in_order
+from merge_cosim.scenarios.methods import is_reference
+
+QUANTITIES = {
+    "host_station": ("host_station_m", 2),
+    "host_speed": ("host_speed_m_s", 2),
+    "host_acceleration": ("host_acceleration_m_s2", 2),
+    "merging_station": ("merging_station_m", 2),
+    "merging_speed": ("merging_speed_m_s", 2),
+    "belief": ("belief", 3),
+    "follows": ("not_yield", 0),
+}
+"""What is drawn of each cycle: its column, and the digits that are kept after the point."""
+MOST_CYCLES = 150_000
+"""Cycles that a page holds; cases beyond are left to traces.parquet. Some 15 characters each."""
+
+
+def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> tuple[list[dict[str, Any]], int]:
+    """The recorded cases with all their methods, and how many cases did not fit.
+
+    Numbers are stored as whole multiples of their last digit, each as its difference from the cycle before.
+
+    Args:
+        traces: Records of all cases, one row per cycle.
+        results: All result rows.
+    """
+    if traces.empty:
+        return [], 0
+    rows = results[results["variation"] == ""].drop_duplicates(["scenario", "case", "method"])
+    rows = rows.set_index(["scenario", "case", "method"]).sort_index()
+    found: list[dict[str, Any]] = []
+    cycles = left_out = 0
+    for (scenario, case), records in traces.groupby(["scenario", "case"], sort=False):
+        cycles += len(records)
+        if cycles > MOST_CYCLES:
+            left_out += 1
+            continue
+        runs = [_run(records[records["method"] == method], method) for method in in_order(records["method"])]
+        for run in runs:
+            run |= _outcome(rows, (scenario, case, run["method"]))
+        first = next(iter(runs))
+        found.append(
+            {
+                "scenario": scenario,
+                "case": case,
+                "host_speed": first.pop("host_speed_0", None),
+                "merging_speed": first.pop("merging_speed_0", None),
+                "failed": sum(run["failed"] for run in runs if not is_reference(run["method"])),
+                "rivals": sum(not is_reference(run["method"]) for run in runs),
+                "runs": runs,
+            }
+        )
+    return found, left_out
+
+
+def _run(records: pd.DataFrame, method: str) -> dict[str, Any]:
+    odds = records["log_odds"].to_numpy(dtype=float)
+    columns = records.assign(belief=0.5 + 0.5 * np.tanh(0.5 * odds))
+    series = {name: differences(columns[column], decimals) for name, (column, decimals) in QUANTITIES.items()}
+    time = records["time_s"].to_numpy(dtype=float)
+    step = float(time[1] - time[0]) if len(time) > 1 else 0.1
+    return {"method": method, "start": round(float(time[0]), 3), "step": round(step, 3), "series": series}
+
+
+def _outcome(rows: pd.DataFrame, key: tuple[Any, ...]) -> dict[str, Any]:
+    if key not in rows.index:
+        return {"failed": False, "outcome": "recorded"}
+    row = rows.loc[key]
+    outcome = next((name for name in ("failed", "stuck", "censored") if bool(row[name])), "passed")
+    kind = f" ({row['failure_kind'].replace('_', ' ')})" if row["failure_kind"] else ""
+    return {
+        "failed": bool(row["failed"]),
+        "outcome": outcome + kind,
+        "delay": round(float(row["delay_s"]), 2),
+        "host_speed_0": float(row["host_speed_0"]),
+        "merging_speed_0": float(row["merging_speed_0"]),
+    }
+
+
+def differences(values: Sequence[float] | pd.Series, decimals: int) -> list[int]:
+    """Values as whole multiples of 10^-decimals, the first as it is, each other as its difference from the last one.
+
+    A missing value repeats the one before; 0 where there is none.
+    """
+    known = pd.Series(values).astype(float).ffill().fillna(0.0).to_numpy()
+    whole: list[int] = np.diff(np.rint(known * 10**decimals).astype(int), prepend=0).tolist()
+    return whole
