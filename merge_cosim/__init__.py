@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from merge_cosim.merging_cars.base import MergingCar, merging_car
     from merge_cosim.ramps.ramp import Ramp
     from merge_cosim.scenarios.scenario import Scenario, load_scenario
+    from merge_cosim.sensors.base import Sensor, sensor
     from merge_cosim.sweeps.listener import HostListener
 
 _HOME = {
@@ -39,6 +40,7 @@ _HOME = {
     "Results": "api.results",
     "Run": "api.run",
     "Scenario": "scenarios.scenario",
+    "Sensor": "sensors.base",
     "Setting": "core.observation",
     "Training": "api.studies",
     "UserError": "core.errors",
@@ -55,6 +57,7 @@ _HOME = {
     "merging_car": "merging_cars.base",
     "reproduce": "api.studies",
     "run": "api.run",
+    "sensor": "sensors.base",
     "sweep": "api.sweep",
     "train": "api.studies",
     "train_ensemble": "api.studies",
@@ -86,9 +89,11 @@ __all__ = [  # noqa: RUF022
     "Estimator",
     "Controller",
     "MergingCar",
+    "Sensor",
     "estimator",
     "controller",
     "merging_car",
+    "sensor",
     "Observation",
     "Setting",
     "HostListener",

@@ -1,5 +1,6 @@
 """The page on parts of one's own: what stands there works."""
 
+import json
 import os
 import re
 import subprocess
@@ -55,6 +56,14 @@ def test_an_estimator_from_a_file(files):
 def test_a_controller_from_a_file(files):
     printed(merge_cosim(*sweep_words("--plugin", "my_controller.py", "--method", "acc+gentle"), cwd=files))
     assert methods(files) == {"acc+gentle"}
+
+
+def test_a_sensor_from_a_file(files):
+    words = ("--plugin", "my_sensor.py", "--method", "acc", "--set", "sensing.model=near")
+    far, near = (
+        printed(merge_cosim(*sweep_words(*words, "--set", f"sensing.reach={reach}"), cwd=files)) for reach in (500, 0)
+    )
+    assert json.loads(far)["summary"][0]["delay_s"] != json.loads(near)["summary"][0]["delay_s"]
 
 
 def test_an_installed_entry_point(files):

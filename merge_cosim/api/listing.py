@@ -14,7 +14,7 @@ from merge_cosim.scenarios.scenario import load_scenario, scenario_names
 
 
 def list_methods(plugins: Sequence[str | Path] = ()) -> pd.DataFrame:
-    """Estimators, controllers and merging cars: role, name, what it is, parameters with their defaults.
+    """Estimators, controllers, merging cars and sensors: role, name, what it is, parameters with their defaults.
 
     Args:
         plugins: Python files with components of your own.

@@ -22,7 +22,7 @@ def methods(
     plugin: Plugins = None,
     json: Json = False,
 ) -> None:
-    """List estimators, controllers and merging cars, or describe the parameters of one."""
+    """List estimators, controllers, merging cars and sensors, or describe the parameters of one."""
     from merge_cosim.scenarios.catalogue import component, components
 
     if name is not None:
@@ -100,5 +100,5 @@ def _description(part: dict[str, Any]) -> str:
     for row, meaning in zip((head, *rows), ["", *(row["meaning"] for row in part["parameters"])], strict=True):
         lines.append("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())
         lines += wrap(meaning, WIDTH, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
-    owner = "merging" if part["role"] == "merging car" else part["name"]
+    owner = {"merging car": "merging", "sensor": "sensing"}.get(part["role"], part["name"])
     return "\n".join([*lines, "", f"Set one with --set {owner}.PARAMETER=VALUE."])

@@ -26,6 +26,12 @@ def stream_keys(names: AnyArray, seed: int) -> Keys:
     return np.frombuffer(digests, dtype="<u8").astype(np.uint64)
 
 
+def derived_keys(keys: Keys, purpose: str) -> Keys:
+    """Return the keys of further streams of the same encounters, one for each purpose, shape (n,)."""
+    salt = np.frombuffer(hashlib.blake2b(purpose.encode(), digest_size=8).digest(), dtype="<u8").astype(np.uint64)
+    return _mixed(keys ^ salt)
+
+
 def uniform(keys: Keys, first: IntArray, count: int) -> FloatArray:
     """Return numbers `first` to `first + count - 1` of each stream, uniform on (0, 1).
 
@@ -38,11 +44,16 @@ def uniform(keys: Keys, first: IntArray, count: int) -> FloatArray:
         Shape (n, count).
     """
     place = first.astype(np.uint64)[:, None] + np.arange(1, count + 1, dtype=np.uint64)
-    mixed: Keys = np.add(keys[:, None], place * _GOLDEN, dtype=np.uint64)
-    mixed = (mixed ^ (mixed >> _STEPS[0])) * _FIRST
+    mixed = _mixed(np.add(keys[:, None], place * _GOLDEN, dtype=np.uint64))
+    return ((mixed >> _UNIT_BITS).astype(np.float64) + 0.5) * _UNIT
+
+
+def _mixed(bits: Keys) -> Keys:
+    """SplitMix64's finalizer, of an array of any shape."""
+    mixed: Keys = (bits ^ (bits >> _STEPS[0])) * _FIRST
     mixed = (mixed ^ (mixed >> _STEPS[1])) * _SECOND
     mixed ^= mixed >> _STEPS[2]
-    return ((mixed >> _UNIT_BITS).astype(np.float64) + 0.5) * _UNIT
+    return mixed
 
 
 def normal(keys: Keys, first: IntArray, count: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Registries: components (estimators, controllers, merging cars) by name, one class in one file each."""
+"""Registries: components (estimators, controllers, merging cars, sensors) by name, one class in one file each."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from merge_cosim.core.registry import Registry, described, did_you_mean, load_pl
 from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.merging_cars.base import merging_cars
 from merge_cosim.scenarios.methods import CONSTANT, HUMAN, ORACLE_BEST
+from merge_cosim.sensors.base import sensors
 
 DERIVED = {
     ORACLE_BEST: f"The better of {' and '.join(CONSTANT)} on each case (made by the statistics).",
@@ -51,7 +52,7 @@ def component(name: str, plugins: Sequence[Path] = ()) -> list[dict[str, Any]]:
         | {"parameters": described(cls)}
         for role, part, cls in known
         if part == (with_controller if with_controller and role == controllers.role else wanted)
-        and not (with_controller and role == merging_cars.role)
+        and not (with_controller and role in (merging_cars.role, sensors.role))
     ]
     rows += [
         {"role": "derived", "name": n, "about": about, "parameters": []} for n, about in DERIVED.items() if n == name
@@ -68,7 +69,7 @@ def component(name: str, plugins: Sequence[Path] = ()) -> list[dict[str, Any]]:
 def _registered(plugins: Sequence[Path]) -> Iterator[tuple[Registry[Any], str, type]]:
     for plugin in plugins:
         load_plugin(plugin)
-    registries: tuple[Registry[Any], ...] = (estimators, controllers, merging_cars)
+    registries: tuple[Registry[Any], ...] = (estimators, controllers, merging_cars, sensors)
     for registry in registries:
         for name in registry.names():
             yield registry, name, registry[name]

@@ -13,6 +13,8 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import Component, Registry, parameters, validated
 from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.sensors.base import Sensor
+from merge_cosim.sensors.perfect import Perfect
 from merge_cosim.simulation.host_driver import HostDriver
 
 ORACLE_BEST = "oracle-best"
@@ -110,14 +112,14 @@ class Method:
         parts = () if self.is_human else (self._estimator, self._controller)
         return [part if isinstance(part, type) else type(part) for part in parts]
 
-    def driver(self, model: IntentionModel | None) -> HostDriver:
-        """Make the two parts anew; `model` goes to an estimator that needs one."""
+    def driver(self, model: IntentionModel | None, sensor: Sensor | None = None) -> HostDriver:
+        """Make the two parts anew; `model` goes to an estimator that needs one. Without a sensor the truth is seen."""
         made_estimator, made_controller = deepcopy(self.objects)
         estimator = made_estimator or estimators.build(self.estimator, self._of(self._estimator), self.name)
         controller = made_controller or controllers.build(self.controller, self._of(self._controller), self.name)
         if estimator.needs_model and model is not None:
             estimator.use(model)
-        return HostDriver(estimator, controller)
+        return HostDriver(estimator, controller, sensor or Perfect())
 
     def _of(self, part: Component | type[Component]) -> dict[str, Any]:
         return _own(self.parameters(), part)

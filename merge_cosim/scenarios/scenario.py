@@ -26,6 +26,7 @@ from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ramps.ramp import ramp_names
 from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Span, Strict, Table, Traffic
 from merge_cosim.scoring.rules import Rules
+from merge_cosim.sensors.base import Sensor, sensors
 from merge_cosim.simulation.worlds.logged_rules import FullScene
 from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.demand import Demand
@@ -45,6 +46,8 @@ class Scenario(Strict):
         ramp: Name or folder of the ramp.
         encounters: Where the initial states come from.
         merging: The merging car's `model` and its parameters.
+        sensing: The `model` of what the host observes of the merging car, and its parameters. Parameters without a
+            model are those of `noisy`; an empty table is `perfect`.
         full_scene: How all other logged cars take part; None for host and merging car alone.
         test: How an encounter is scored.
         speed_limit: Speed limit [m/s]; the ramp's own if not given.
@@ -56,6 +59,7 @@ class Scenario(Strict):
     ramp: str
     encounters: Annotated[Grid | Random | ByArrival | Table | Pairs | Routes | Traffic, Field(discriminator="kind")]
     merging: dict[str, Any]
+    sensing: dict[str, Any] = Field(default_factory=dict)
     full_scene: FullScene | None = None
     test: Rules = Rules()
     speed_limit: PositiveFloat | None = None
@@ -69,6 +73,16 @@ class Scenario(Strict):
         """
         values = dict(self.merging)
         return merging_cars.build(str(values.pop("model", "")), values, "[merging]")
+
+    def sensor(self) -> Sensor:
+        """Make the sensor.
+
+        Raises:
+            UserError: There is no such model or parameter.
+        """
+        values = dict(self.sensing)
+        model = values.pop("model", "noisy" if values else "perfect")
+        return sensors.build(str(model), values, "[sensing]")
 
     @model_validator(mode="after")
     def _driven(self) -> Self:
@@ -102,7 +116,7 @@ class Scenario(Strict):
 
 SUMO_SUFFIXES = (".sumocfg", ".cfg")
 """Endings of SUMO's configurations; the second is what older ones are called."""
-SECTIONS = ("ramp", "encounters", "merging", "full_scene", "test", "speed_limit")
+SECTIONS = ("ramp", "encounters", "merging", "sensing", "full_scene", "test", "speed_limit")
 """What of a scenario can be set or varied from the command line."""
 
 
@@ -166,11 +180,12 @@ def _validated(document: dict[str, Any], settings: Mapping[str, Any] | None, whe
         raise UserError(f"{where}: {_first_problem(error)}") from None
     except UserError as error:
         raise UserError(f"{where}: {error}") from None
-    if not scenario.is_scene:
-        try:
+    try:
+        scenario.sensor()
+        if not scenario.is_scene:
             scenario.merging_car()
-        except UserError as error:
-            raise UserError(f"{where}: {error}") from None
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
     return scenario
 
 

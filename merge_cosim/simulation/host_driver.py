@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -14,31 +14,44 @@ from merge_cosim.core.random_streams import Keys
 from merge_cosim.core.registry import Component
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.estimators.base import Estimator
+from merge_cosim.sensors.base import Sensor
+from merge_cosim.sensors.perfect import Perfect
 
 
 @dataclass(frozen=True)
 class HostDriver:
-    """A method, ready to drive: an estimator and a controller."""
+    """A method, ready to drive: an estimator and a controller, and the sensor that they see through.
+
+    All that they derive from the merging car's state, such as `Observation.merging_in_lane`, comes from the observed
+    one: a host whose sensor is late or wrong takes the merging car to be in the lane when the sensor says so.
+    """
 
     estimator: Estimator
     controller: Controller
+    sensor: Sensor = field(default_factory=Perfect)
 
     def start(self, count: int, setting: Setting) -> None:
         """Make room for a batch of `count` encounters."""
+        self.sensor.start(count, setting)
         self.estimator.start(count, setting)
         self.controller.start(count, setting)
 
     def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
         """Forget the encounters at `rows`; see `Estimator.reset`."""
+        self.sensor.reset(rows, keys)
         self.estimator.reset(rows, labels, keys)
         self.controller.reset(rows)
 
-    def decide(self, seen: Observation) -> tuple[FloatArray, FloatArray]:
+    def decide(self, now: Observation) -> tuple[FloatArray, FloatArray]:
         """The log-odds of NOT_YIELD and the acceleration to command [m/s^2], shape (n,) each.
+
+        Args:
+            now: The present cycle, before the sensor.
 
         Raises:
             UserError: A component gives NaN, or an array of another shape.
         """
+        seen = self.sensor.observe(now)
         log_odds = _numbers(self.estimator.update(seen), self.estimator, seen)
         target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
         acceleration = self.controller.command(seen, log_odds, target)
@@ -74,7 +87,7 @@ class DriverBlocks:
         for number, block in enumerate(self._blocks):
             own = slice(number * self._size, (number + 1) * self._size)
             if np.count_nonzero(active[own]):
-                part = Observation(*(getattr(seen, field.name)[own] for field in fields(Observation)))
+                part = Observation(*(getattr(seen, one.name)[own] for one in fields(Observation)))
                 log_odds[own], acceleration[own] = block.decide(part)
         return log_odds, acceleration
 

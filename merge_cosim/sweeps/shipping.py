@@ -24,16 +24,18 @@ from merge_cosim.controllers.base import controllers
 from merge_cosim.core.registry import PLUGIN, Component, Registry, source_of
 from merge_cosim.estimators.base import estimators
 from merge_cosim.merging_cars.base import merging_cars
+from merge_cosim.sensors.base import sensors
 from merge_cosim.sweeps.task import Task
 
-REGISTRIES: dict[str, Registry[Any]] = {one.role: one for one in (estimators, controllers, merging_cars)}
+REGISTRIES: dict[str, Registry[Any]] = {one.role: one for one in (estimators, controllers, merging_cars, sensors)}
 
 
 def own_classes(task: Task) -> list[type[Component]]:
-    """Classes of the task's method and merging car that are not of this package."""
-    model = str(task.scenario.merging.get("model"))
-    car = [merging_cars[model]] if model in merging_cars else []
-    classes: list[type[Component]] = [*task.method.classes(), *car]
+    """Classes of the task's method, merging car and sensor that are not of this package."""
+    scenario = task.scenario
+    named = ((merging_cars, scenario.merging.get("model")), (sensors, scenario.sensing.get("model")))
+    others: list[type[Component]] = [registry[str(model)] for registry, model in named if str(model) in registry]
+    classes = [*task.method.classes(), *others]
     return [cls for cls in classes if not _is_of_this_package(cls.__module__)]
 
 

@@ -116,7 +116,7 @@ class Task:
     def simulate(self, world: World, seed: int = 0, traced: Container[str] = ()) -> Run:
         """Simulate the cases in a world, with the given seed of the encounters' random streams."""
         scenario = self.scenario
-        driver = Undecided() if self.method.is_human else self.method.driver(self.model)
+        driver = Undecided() if self.method.is_human else self.method.driver(self.model, scenario.sensor())
         run = simulate(
             world,
             self.cases.encounters,

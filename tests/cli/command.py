@@ -15,6 +15,7 @@ from merge_cosim.cli.main import main
 from merge_cosim.controllers.base import controllers
 from merge_cosim.estimators.base import estimators
 from merge_cosim.merging_cars.base import merging_cars
+from merge_cosim.sensors.base import sensors
 
 SMALL = """
 title = "A coarse grid"
@@ -44,7 +45,7 @@ def merge_cosim(*arguments: object, cwd: Path, **environment: str) -> subprocess
         stack.enter_context(patch.object(sys, "argv", words))
         stack.enter_context(patch.object(os, "cpu_count", lambda: 1))
         stack.enter_context(patch.dict(os.environ, without_data() | environment, clear=True))
-        for registry in (estimators, controllers, merging_cars):
+        for registry in (estimators, controllers, merging_cars, sensors):
             registry.names()  # our own classes are registered from now on
             stack.enter_context(patch.dict(registry._classes))
         output, error = (stack.enter_context(_written(*stream)) for stream in (("stdout", 1), ("stderr", 2)))

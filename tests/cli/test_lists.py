@@ -32,7 +32,7 @@ def test_the_cache_is_shown_and_cleared(tmp_path):
 def test_the_table_of_methods_holds_their_parameters():
     done = runner.invoke(lists.app, ["methods"], env={"COLUMNS": "400"})
     assert done.exit_code == 0
-    for shown in ("estimator", "controller", "merging car", "headway=1.5", "oracle-best"):
+    for shown in ("estimator", "controller", "merging car", "sensor", "headway=1.5", "oracle-best"):
         assert shown in done.stdout
 
 

@@ -31,6 +31,12 @@ import merge_cosim as package
         (("--set", "dbn-pf.start_yield=0.7"), "dbn-pf: start_yield and start_not_yield are more than 1 together"),
         (("--set", "dbn-pf.min_acceleration=5"), "dbn-pf: min_acceleration is above max_acceleration"),
         (("--set", "merging.model=hidden", "--set", "merging.min_margin=3"), "min_margin is above max_margin"),
+        (("--set", "sensing.delay=-1"), "sensor noisy: delay = -1: Input should be greater than or equal to 0"),
+        (
+            ("--set", "sensing.model=lidar"),
+            "unknown sensor 'lidar'; did you mean 'radar'? (choose from: camera",
+        ),
+        (("--set", "sensing.model=radar", "--set", "sensing.dely=1"), "no parameter 'dely'; did you mean 'delay'?"),
         (("--method", "acc,pgn"), "unknown estimator 'pgn'; did you mean 'pgm'?"),
         (("--method", ""), "unknown estimator ''"),
     ],
@@ -44,6 +50,21 @@ def delays(folder, *words):
     done = merge_cosim("sweep", "small.toml", *words, "--out", "out", "--jobs", 1, cwd=folder)
     assert done.returncode == 0, done.stderr
     return pq.read_table(folder / "out/results.parquet").to_pandas().set_index(["method", "case"])["delay_s"]
+
+
+def test_the_sensor_is_a_setting(tmp_path):
+    """Parameters alone are those of `noisy`; a table in the file is the same; without errors nothing changes."""
+    small_scenario(tmp_path)
+    usual = delays(tmp_path, "--method", "acc")
+    assert delays(tmp_path, "--method", "acc", "--set", "sensing.model=noisy").equals(usual)
+    words = ("--method", "acc", "--set", "sensing.delay=0.5", "--set", "sensing.station_sigma=3")
+    changed = delays(tmp_path, *words)
+    assert (changed != usual).mean() > 0.3
+    assert delays(tmp_path, *words, "--set", "sensing.model=noisy", "--world", "closed-form").equals(changed)
+    assert (delays(tmp_path, *words, "--seed", 1) != changed).any()
+    with (tmp_path / "small.toml").open("a") as file:
+        file.write('[sensing]\nmodel = "noisy"\ndelay = 0.5\nstation_sigma = 3\n')
+    assert delays(tmp_path, "--method", "acc").equals(changed)
 
 
 def test_each_setting_has_one_owner(tmp_path):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from merge_cosim.core.random_streams import normal, stream_keys, uniform
+from merge_cosim.core.random_streams import derived_keys, normal, stream_keys, uniform
 
 
 def test_splitmix64_gives_its_published_sequence():
@@ -34,6 +34,16 @@ def test_streams_are_distributed_as_they_should_be():
     drawn = normal(keys, start, 500)
     assert kstest(drawn.ravel(), "norm").pvalue > 0.001
     assert np.corrcoef(drawn[:-1].ravel(), drawn[1:].ravel())[0, 1] == pytest.approx(0.0, abs=0.02)
+
+
+def test_derived_streams_are_streams_of_their_own():
+    keys = stream_keys(np.array([f"case-{i}" for i in range(200)]), 7)
+    start = np.zeros(200, dtype=np.int64)
+    drawn = [uniform(one, start, 500) for one in (keys, derived_keys(keys, "a"), derived_keys(keys, "b"))]
+    for one, other in ((0, 1), (0, 2), (1, 2)):
+        assert np.corrcoef(drawn[one].ravel(), drawn[other].ravel())[0, 1] == pytest.approx(0.0, abs=0.02)
+    assert kstest(drawn[1].ravel(), "uniform").pvalue > 0.001
+    np.testing.assert_array_equal(derived_keys(keys, "a")[3:4], derived_keys(keys[3:4], "a"))
 
 
 def test_seed_and_name_make_the_key():

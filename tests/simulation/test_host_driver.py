@@ -11,6 +11,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.estimators.base import Estimator
 from merge_cosim.estimators.references import AlwaysGo
+from merge_cosim.sensors.noisy import Noisy
 from merge_cosim.simulation.host_driver import DriverBlocks, HostDriver
 
 SEEN = Observation(*np.array([[-80.0, -60.0], [25.0, 24.0], [-70.0, -90.0], [20.0, 21.0], [5.0, 5.0], [4.0, 4.0]]))
@@ -97,3 +98,22 @@ def test_blocks_are_added_while_others_go_on():
     idle, _ = blocks.decide(four, np.array([False, False, True, False]))
     assert idle.tolist() == [0.0, 0.0, 2.0, 2.0]  # the first block was left out
     assert blocks.decide(four, np.array([True, False, False, False]))[0].tolist()[:2] == [3.0, 2.0]
+
+
+def test_what_is_decided_comes_from_what_is_observed():
+    """Until the sensor reports the merging car in the lane, a belief counts; each block keeps its own memory."""
+    driver = HostDriver(AlwaysGo(), Acc(), Noisy(delay=0.2))
+    blocks = DriverBlocks(driver, 1, Setting())
+    blocks.make_room(2)
+    nothing, keys = np.zeros(1, dtype=int), np.zeros(1, dtype=np.uint64)
+    blocks.reset(np.array([0]), nothing, keys)
+    commands = []
+    for cycle in range(6):
+        if cycle == 2:
+            blocks.reset(np.array([1]), nothing, keys)
+        station = np.array([-0.6 + cycle, -2.6 + cycle])
+        state = (np.full(2, -5.0), np.full(2, 20.0), station, np.full(2, 10.0), np.full(2, 5.0), np.full(2, 4.0))
+        commands.append(blocks.decide(Observation(*state), np.array([True, cycle >= 2]))[1].tolist())
+    braking = (np.array(commands) < 0.0).T
+    assert braking[0].tolist() == [False] * 3 + [True] * 3  # in the lane in cycle 1, seen there in cycle 3
+    assert braking[1].tolist() == [False] * 5 + [True]  # in the lane in cycle 3, seen there in cycle 5

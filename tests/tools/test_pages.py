@@ -6,6 +6,7 @@ from pathlib import Path
 import geometry_page
 import method_pages
 import models_page
+import robustness_page
 import scenes_page
 import sensitivity_page
 import surrogate_page
@@ -34,6 +35,11 @@ def test_sensitivity(tmp_path):
     text = made_like(tmp_path, "sensitivity.md")
     assert "**designed-2** (n = 48)" in text
     assert "| **clear** |" in text
+
+
+def test_robustness(tmp_path):
+    robustness_page.main(["--short", "--docs", str(tmp_path)])
+    assert made_like(tmp_path, "sensors.md").count("| `sensing.") == 13
 
 
 def test_traffic(tmp_path):

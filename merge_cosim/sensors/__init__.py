@@ -1,0 +1,1 @@
+"""What the host observes of the merging car."""
