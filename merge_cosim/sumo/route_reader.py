@@ -12,8 +12,9 @@ from lxml import etree
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import TOLERANCE
 from merge_cosim.ramps.ramp import Ramp
-from merge_cosim.sumo.configuration import Configuration, parse
+from merge_cosim.sumo.configuration import DEFAULT_TYPE, Configuration, parse
 from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 from merge_cosim.sumo.vehicle_types import MERGE_POSITION, ROLE
 
@@ -21,11 +22,16 @@ ROLES = ("host", "merging")
 DEFAULT_LENGTH = 5.0
 """Length of SUMO's default passenger car [m]."""
 
+_PATHS = {"host": ("along the main road", "host's lane"), "merging": ("over the on-ramp", "merging car's lane")}
+_NO_TYPE = etree.Element("vType")
+
 
 @dataclass(frozen=True)
 class _Car:
     name: str
-    edge: str
+    where: str
+    route: tuple[str, ...]
+    lane: str | None
     position: float
     speed: float
     length: float
@@ -37,7 +43,7 @@ def only_pairs(configuration: Configuration) -> bool:
 
     Both start from numbers, and at the same time.
     """
-    entries = [entry for file in configuration.routes for entry in _entries(parse(file)) if entry.has_start]
+    entries = [entry for entry in _entries(configuration) if entry.has_start]
     host, merging = ([one.vehicle.get("depart") for one in entries if one.role == role] for role in ROLES)
     everything = len(list(configuration.vehicles()))
     return 0 < everything == len(entries) and host == merging
@@ -48,17 +54,16 @@ def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
 
     Its net must be that of a ramp (`ramp.toml` lies beside it). The k-th car with the role `host` meets the k-th with
     the role `merging`, in the order of the route files; their start is given by departure edge, position and speed, as
-    numbers. Other cars are passed over.
+    numbers. A host's route leads along the main road, a merging car's over the on-ramp. Other cars are passed over.
 
     Raises:
-        UserError: A file is missing or no XML, or a car cannot be understood.
+        UserError: A file is missing or no XML, or a car cannot be understood or is routed elsewhere.
     """
     configuration = Configuration.read(file)
-    ramp, routes = Ramp.load(configuration.net.parent), configuration.routes
+    ramp = Ramp.load(configuration.net.parent)
     cars: dict[str, list[_Car]] = {role: [] for role in ROLES}
-    for route_file in routes:
-        for role, car in _cars(route_file):
-            cars[role].append(car)
+    for entry in _entries(configuration):
+        cars[entry.role].append(_car(entry))
     hosts, merging = cars["host"], cars["merging"]
     if not hosts or len(hosts) != len(merging):
         raise UserError(
@@ -68,38 +73,71 @@ def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
     merge_position = np.array(
         [ramp.merging_point if car.merge_position is None else car.merge_position for car in merging]
     )
+    names = [f"{host.name}_{car.name}" for host, car in zip(hosts, merging, strict=True)]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise UserError(f"{file}: two encounters are called '{twice[0]}'; give each vehicle an id of its own")
     return ramp, Encounters.unlogged(
-        np.array([f"{host.name}_{car.name}" for host, car in zip(hosts, merging, strict=True)]),
+        np.array(names),
         ramp.name,
         "designed",
-        host_station=_stations(ramp, hosts, merge_position, routes[0]),
+        host_station=_stations(ramp, "host", hosts, merge_position),
         host_speed=np.array([car.speed for car in hosts]),
         host_length=np.array([car.length for car in hosts]),
-        merging_station=_stations(ramp, merging, merge_position, routes[0]),
+        merging_station=_stations(ramp, "merging", merging, merge_position),
         merging_speed=np.array([car.speed for car in merging]),
         merging_length=np.array([car.length for car in merging]),
         merge_position=merge_position,
     )
 
 
-def _stations(ramp: Ramp, cars: list[_Car], merge_position: np.ndarray, file: Path) -> np.ndarray:
-    lanes, stations = LaneMap(ramp), []
-    for car, merging_point in zip(cars, merge_position, strict=True):
-        try:
-            stations.append(lanes.station(LanePosition(car.edge, 0, car.position), float(merging_point)))
-        except ValueError as error:
-            raise UserError(f"{file}: vehicle '{car.name}': {error}") from None
-    return np.array(stations)
+def _stations(ramp: Ramp, role: str, cars: list[_Car], merge_position: np.ndarray) -> np.ndarray:
+    """Stations of cars of one role at their start [m]."""
+    lanes = LaneMap(ramp)
+    found = [lanes.station(_start(ramp, role, car), float(at)) for car, at in zip(cars, merge_position, strict=True)]
+    return np.array(found)
+
+
+def _start(ramp: Ramp, role: str, car: _Car) -> LanePosition:
+    """Where a car starts, after making sure that it drives as its role says."""
+    edge, (way, path) = car.route[0], _PATHS[role]
+    route = ramp.main_route if role == "host" else ramp.ramp_route
+    along = route[route.index(edge) :] if edge in route else ()
+    if not along or any(mine != theirs for mine, theirs in zip(car.route, along, strict=False)):
+        raise UserError(
+            f"{car.where}: its route is '{' '.join(car.route)}'; a {role} car comes {way}: {' '.join(route)}"
+        )
+    sections = [one for one in (ramp.main if role == "host" else ramp.ramp + ramp.main) if one.edge == edge]
+    lanes = {str(one.lane) for one in sections}
+    if _is_number(car.lane) and car.lane not in lanes:
+        raise UserError(
+            f"{car.where}: departLane is {car.lane}; on '{edge}' the {path} is {' or '.join(sorted(lanes))}"
+        )
+    length = sections[0].length
+    position = car.position + length if car.position < 0.0 else car.position  # SUMO counts from the end, too
+    if not -TOLERANCE <= position <= length + TOLERANCE:
+        raise UserError(f"{car.where}: departPos is {car.position:g}; '{edge}' is {length:g} m long")
+    return LanePosition(edge, sections[0].lane, position)
 
 
 @dataclass(frozen=True)
 class _Entry:
-    """A `<vehicle>` with a role, its type, and the parameters of both."""
+    """A `<vehicle>` with a role.
+
+    Attributes:
+        vehicle: The element.
+        where: File, line and id, for error lines.
+        role: Its role.
+        parameters: Those of its type and its own.
+        length: Length of its type, as it is written.
+        edges: Its route.
+    """
 
     vehicle: etree._Element
-    kind: etree._Element
+    where: str
     role: str
     parameters: dict[str | None, str]
+    length: str
+    edges: str
 
     @property
     def has_start(self) -> bool:
@@ -107,47 +145,54 @@ class _Entry:
         return all(_is_number(self.vehicle.get(name)) for name in ("departPos", "departSpeed"))
 
 
-def _entries(root: etree._Element) -> Iterator[_Entry]:
-    types = {kind.get("id", ""): kind for kind in root.iter("vType")}
-    for vehicle in root.iter("vehicle"):
-        kind = types.get(vehicle.get("type", ""))
-        parameters = {one.get("key"): one.get("value", "") for one in ([] if kind is None else kind.iter("param"))}
-        parameters |= {one.get("key"): one.get("value", "") for one in vehicle.iter("param")}
-        role = parameters.get(ROLE)
-        if kind is not None and role is not None:
-            yield _Entry(vehicle, kind, role, parameters)
+def _entries(configuration: Configuration) -> Iterator[_Entry]:
+    """The vehicles with a role, in the order of the files; types and routes may stand in any of these."""
+    roots = {file: parse(file) for file in (*configuration.routes, *configuration.additional)}
+    types = {kind.get("id"): kind for root in roots.values() for kind in root.iter("vType")}
+    routes = {one.get("id"): one.get("edges", "") for root in roots.values() for one in root.iter("route")}
+    for file, root in roots.items():
+        for vehicle in root.iter("vehicle"):
+            kind = types.get(vehicle.get("type", DEFAULT_TYPE), _NO_TYPE)
+            parameters = {
+                one.get("key"): one.get("value", "") for part in (kind, vehicle) for one in part.iter("param")
+            }
+            role = parameters.get(ROLE)
+            if role is None:
+                continue
+            where = f"{file}:{vehicle.sourceline}: vehicle '{vehicle.get('id')}'"
+            if role not in ROLES:
+                raise UserError(f"{where}: {ROLE} is '{role}'; it must be {' or '.join(ROLES)}")
+            inner, named = vehicle.find("route"), vehicle.get("route")
+            edges = inner.get("edges", "") if inner is not None else routes.get(named, "") if named else ""
+            yield _Entry(vehicle, where, role, parameters, kind.get("length", str(DEFAULT_LENGTH)), edges)
 
 
-def _cars(file: Path) -> Iterator[tuple[str, _Car]]:
-    root = parse(file)
-    routes = {route.get("id"): route.get("edges", "") for route in root.iter("route")}
-    for entry in _entries(root):
-        vehicle, kind, role, parameters = entry.vehicle, entry.kind, entry.role, entry.parameters
-        where = f"{file}:{vehicle.sourceline}: vehicle '{vehicle.get('id')}'"
-        if role not in ROLES:
-            raise UserError(f"{where}: {ROLE} is '{role}'; it must be {' or '.join(ROLES)}")
-        inner = vehicle.find("route")
-        edges = (inner.get("edges", "") if inner is not None else routes.get(vehicle.get("route"), "")).split()
-        if not edges:
-            raise UserError(f"{where}: it has no route")
-        merge_position = parameters.get(MERGE_POSITION)
-        yield (
-            role,
-            _Car(
-                name=vehicle.get("id", ""),
-                edge=edges[0],
-                position=_number(vehicle.get("departPos"), "departPos", where),
-                speed=_number(vehicle.get("departSpeed"), "departSpeed", where),
-                length=_number(kind.get("length", str(DEFAULT_LENGTH)), "length", where),
-                merge_position=None if merge_position is None else _number(merge_position, MERGE_POSITION, where),
-            ),
-        )
+def _car(entry: _Entry) -> _Car:
+    vehicle, where = entry.vehicle, entry.where
+    if not entry.edges.split():
+        named = vehicle.get("route")
+        why = f"no route with edges is called '{named}'" if named else 'it has no route; give it <route edges="..."/>'
+        raise UserError(f"{where}: {why}")
+    merge_position = entry.parameters.get(MERGE_POSITION)
+    return _Car(
+        name=vehicle.get("id", ""),
+        where=where,
+        route=tuple(entry.edges.split()),
+        lane=vehicle.get("departLane"),
+        position=_number(vehicle.get("departPos"), "departPos", where),
+        speed=_number(vehicle.get("departSpeed"), "departSpeed", where, least=0.0),
+        length=_number(entry.length, "length", where, least=0.1),
+        merge_position=None if merge_position is None else _number(merge_position, MERGE_POSITION, where),
+    )
 
 
-def _number(text: str | None, name: str, where: str) -> float:
+def _number(text: str | None, name: str, where: str, least: float = -math.inf) -> float:
     if not _is_number(text):
         raise UserError(f"{where}: {name} is '{text or ''}'; an encounter needs a number")
-    return float(text or "")
+    value = float(text or "")
+    if value < least:
+        raise UserError(f"{where}: {name} is {text}; it must be at least {least:g}")
+    return value
 
 
 def _is_number(text: str | None) -> bool:

@@ -57,6 +57,28 @@ def test_a_file_of_ones_own(tmp_path):
     assert (encounters.host_length[0], encounters.merging_length[0]) == (4.6, 5.0)
 
 
+def test_types_and_routes_in_any_of_the_files(tmp_path):
+    """As SUMO reads them: the parameter of a vehicle of SUMO's own type, a position from the edge's end."""
+    (tmp_path / "types.add.xml").write_text(
+        '<add><vType id="human" length="7"/><route id="up" edges="ramp main_out"/></add>'
+    )
+    routes = """<routes>
+      <vehicle id="h" depart="0" departPos="-95" departSpeed="20"><route edges="main_in main_out"/>
+      <param key="merge-cosim.role" value="host"/></vehicle>
+      <vehicle id="m" type="human" route="up" depart="0" departPos="410" departSpeed="18">
+      <param key="merge-cosim.role" value="merging"/></vehicle></routes>"""
+    more = '<additional-files value="types.add.xml"/></input>'
+    _, encounters = read_sumocfg(write(tmp_path, routes, CONFIG.replace("</input>", more)))
+    assert (encounters.host_station[0], encounters.merging_station[0]) == (-95.0, -90.0)
+    assert (encounters.host_length[0], encounters.merging_length[0]) == (5.0, 7.0)
+
+
+def test_two_encounters_of_one_name_are_refused(tmp_path):
+    twice = "".join(f"{line}\n" * (2 if "departPos" in line else 1) for line in ROUTES.splitlines())
+    with pytest.raises(UserError, match=r"my\.sumocfg: two encounters are called 'h0_m0'"):
+        read_sumocfg(write(tmp_path, twice))
+
+
 def test_cars_that_depart_at_other_times_are_no_pair(tmp_path):
     alone = ROUTES.replace('<vehicle id="bystander" type="other" route="through" depart="0"/>', "")
     file = write(tmp_path)
@@ -72,9 +94,23 @@ def test_cars_that_depart_at_other_times_are_no_pair(tmp_path):
         ('departPos="405"', 'departPos="base"', r"vehicle 'h0': departPos is 'base'"),
         ('departSpeed="20"', 'departSpeed="nan"', r"departSpeed"),
         ('departSpeed="20"', "", r"departSpeed is ''"),
-        ('edges="ramp main_out"', 'edges="nowhere main_out"', r"vehicle 'm0': .*'nowhere'"),
+        ('edges="ramp main_out"', 'edges="nowhere main_out"', r"vehicle 'm0': its route is 'nowhere main_out'"),
         ('type="human" depart', 'type="auto" depart', r"2 cars with the role host and 0"),
         ("</routes>", "", r"my\.rou\.xml: not XML"),
+        # Without a route it had that of m0, whose own has no id, either.
+        ('type="auto" route="through"', 'type="auto"', r"my\.rou\.xml:6: vehicle 'h0': it has no route"),
+        ('type="auto" route="through"', 'type="auto" route="thru"', r"'h0': no route with edges is called 'thru'"),
+        (
+            'edges="ramp main_out"',
+            'edges="main_in main_out"',
+            r"'m0': its route is 'main_in main_out'; a merging car co",
+        ),
+        ('edges="ramp main_out"', 'edges="ramp main_in"', r"'m0': its route is 'ramp main_in'; a merging car comes ov"),
+        ('id="through" edges="main_in', 'id="through" edges="ramp', r"'h0': its route is 'ramp main_out'; a host car"),
+        ('departPos="405"', 'departPos="4050"', r"'h0': departPos is 4050; 'main_in' is 500 m long"),
+        ('departPos="405"', 'departPos="405" departLane="3"', r"'h0': departLane is 3; on 'main_in' the host's lane i"),
+        ('departSpeed="20"', 'departSpeed="-20"', r"'h0': departSpeed is -20; it must be at least 0"),
+        ('length="4.6"', 'length="0"', r"'h0': length is 0; it must be at least 0.1"),
     ],
 )
 def test_mistakes_in_routes_are_named(tmp_path, old, new, expected):
