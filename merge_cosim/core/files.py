@@ -1,10 +1,13 @@
 """Where shipped files and generated files lie."""
 
+import hashlib
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import platformdirs
+from filelock import FileLock
 
 _PACKAGE = Path(__file__).parent.parent
 
@@ -26,6 +29,59 @@ def cache_folder(*parts: str) -> Path:
 def write_atomically(target: Path, content: bytes) -> None:
     """Write a file so that another process sees it whole or not at all."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=target.name)
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-    Path(name).replace(target)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        Path(name).replace(target)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def from_cache(place: Path, make: Callable[[Path], object]) -> Path:
+    """Return a file or folder of the cache, made first where it is missing or damaged; see `keep`."""
+    if not is_whole(place):
+        keep(place, make)
+    return place
+
+
+def keep(place: Path, make: Callable[[Path], object]) -> None:
+    """Make a file or folder of the cache, unless another process has done so.
+
+    It is made under another name and moved to `place` when it is whole. A digest of its content is kept beside it.
+
+    Args:
+        place: Where it is to lie, in a folder that exists.
+        make: Writes it to the path that it is given.
+    """
+    with FileLock(_beside(place, "lock")):
+        if is_whole(place):
+            return
+        with tempfile.TemporaryDirectory(dir=place.parent) as scratch:
+            made = Path(scratch) / place.name
+            make(made)
+            digest = _digest(made)
+            if place.exists():
+                place.rename(Path(scratch) / "damaged")
+            made.rename(place)
+        write_atomically(_beside(place, "sha256"), digest.encode())
+
+
+def is_whole(place: Path) -> bool:
+    """Whether a file or folder of the cache is there, with the content that it was made with."""
+    try:
+        return _beside(place, "sha256").read_bytes() == _digest(place).encode()
+    except OSError:
+        return False
+
+
+def _beside(place: Path, kind: str) -> Path:
+    return place.with_name(f"{place.name}.{kind}")
+
+
+def _digest(place: Path) -> str:
+    """A hash of a file, or of all files of a folder and their names."""
+    held = hashlib.sha256()
+    for file in sorted(place.iterdir()) if place.is_dir() else [place]:
+        with file.open("rb") as content:
+            held.update(f"{file.name} {hashlib.file_digest(content, 'sha256').hexdigest()}\n".encode())
+    return held.hexdigest()

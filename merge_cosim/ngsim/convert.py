@@ -40,7 +40,7 @@ class Conversion:
     rows: int
     kept: int
     repeats: Repeats
-    elsewhere: Counter[str]
+    elsewhere: dict[str, int]
     recordings: list[Recording]
     written: dict[str, Path]
 
@@ -73,7 +73,7 @@ def convert(files: Sequence[Path], out: Path, wanted: Site | None = None) -> Con
         pq.write_table(table, written[name])
     recordings = [recording for table in tables.values() for recording in extents(table)]
     kept = sum(table.num_rows for table in tables.values())
-    return Conversion(everything.rows, kept, everything.repeats, elsewhere, recordings, written)
+    return Conversion(everything.rows, kept, everything.repeats, dict(elsewhere), recordings, written)
 
 
 def extents(table: pa.Table) -> list[Recording]:

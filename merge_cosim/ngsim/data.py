@@ -3,18 +3,16 @@
 import hashlib
 import json
 import os
-import shutil
-import tempfile
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.files import cache_folder
+from merge_cosim.core.files import cache_folder, from_cache
 from merge_cosim.ngsim.download import UNFINISHED
 from merge_cosim.ngsim.formats import NGSIM, Kind, Layout, sources
 from merge_cosim.ngsim.read import Reading, merge, read_file
@@ -23,6 +21,9 @@ from merge_cosim.ngsim.table import Repeats
 
 READER_VERSION = 1
 """Raised when the same file would be read differently, so that cached tables are made anew."""
+
+FACTS = "reading.json"
+"""The file of a cached reading that names its tables."""
 
 ENVIRONMENT = "MERGE_COSIM_DATA"
 """Environment variable that names the data folder."""
@@ -130,31 +131,24 @@ def cached(path: Path, wanted: Site | None = None) -> Reading:
     key = f"{path.resolve()}|{state.st_size}|{state.st_mtime_ns}|{READER_VERSION}"
     key += f"|{wanted!r}" if wanted else ""
     folder = cache_folder("ngsim") / hashlib.sha256(key.encode()).hexdigest()[:16]
-    if not (folder / "reading.json").is_file():
-        reading = read_file(path, wanted)
-        _store(reading, folder)
-        return reading
-    facts = json.loads((folder / "reading.json").read_text())
-    tables = {name: pq.read_table(folder / f"{name}.parquet") for name in facts["sites"]}
+    from_cache(folder, lambda made: _store(read_file(path, wanted), made))
+    facts = json.loads((folder / FACTS).read_bytes())
+    tables = {name: pq.read_table(folder / f"{number}.parquet") for number, name in enumerate(facts["sites"])}
     return Reading(tables, facts["rows"], Counter(facts["elsewhere"]), Repeats(**facts["repeats"]))
 
 
 def _store(reading: Reading, folder: Path) -> None:
-    """Write a reading beside its place and move it there, so that no other process ever sees half of it."""
-    made = Path(tempfile.mkdtemp(dir=folder.parent))
-    for name, table in reading.tables.items():
-        pq.write_table(table, made / f"{name}.parquet")
+    """Write a reading's tables and facts; a site's name may be no file name."""
+    folder.mkdir()
+    for number, table in enumerate(reading.tables.values()):
+        pq.write_table(table, folder / f"{number}.parquet")
     facts = {
         "sites": list(reading.tables),
         "rows": reading.rows,
         "elsewhere": reading.elsewhere,
-        "repeats": {"dropped": reading.repeats.dropped, "conflicting": reading.repeats.conflicting},
+        "repeats": asdict(reading.repeats),
     }
-    (made / "reading.json").write_text(json.dumps(facts))
-    try:
-        made.rename(folder)
-    except OSError:
-        shutil.rmtree(made)  # another process was faster
+    (folder / FACTS).write_text(json.dumps(facts))
 
 
 def _look(path: Path, layout: Layout) -> DataFile:

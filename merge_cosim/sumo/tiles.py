@@ -7,8 +7,9 @@ from pathlib import Path
 
 from lxml import etree
 
-from merge_cosim.core.files import cache_folder, write_atomically
+from merge_cosim.core.files import cache_folder, from_cache
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.sumo.xml import write_xml
 
 SPACING = 30.0
 """Free room between two tiles [m], for the eye only: tiles share no node."""
@@ -39,15 +40,17 @@ def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
     ingredients = source + repr((ramp.main, ramp.ramp, count, whole)).encode() + Path(__file__).read_bytes()
     key = hashlib.sha256(ingredients).hexdigest()[:16]
     target = cache_folder("tiles") / f"{ramp.name}-{count}-{key}.net.xml"
-    if not target.is_file():
+
+    def make(file: Path) -> None:
         text = gzip.decompress(source) if ramp.net.suffix == ".gz" else source
         net = etree.fromstring(text, etree.XMLParser(remove_blank_text=True, remove_comments=True))
         _leave_out_internal(net)
         if not whole:
             _reduce(net, ramp)
         _multiply(net, count)
-        write_atomically(target, etree.tostring(net, xml_declaration=True, encoding="UTF-8", pretty_print=True))
-    return target
+        write_xml(file, net)
+
+    return from_cache(target, make)
 
 
 def _leave_out_internal(net: etree._Element) -> None:

@@ -193,6 +193,6 @@ def _unpack(kind: str, files: Mapping[str, bytes], name: str) -> Path:
     """Write files that came along into a folder of the cache that is named by their content."""
     folder = cache_folder("shipped", kind, digest_of(files), name)
     for key, content in files.items():
-        if not (folder / key).is_file():
+        if not (folder / key).is_file() or (folder / key).read_bytes() != content:
             write_atomically(folder / key, content)
     return folder

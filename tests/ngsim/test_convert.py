@@ -1,4 +1,7 @@
+import json
+
 import pytest
+from command import merge_cosim, refused
 from ngsim_files import car, write_csv, write_portal
 
 from merge_cosim.core.errors import UserError
@@ -40,3 +43,15 @@ def test_a_file_is_not_overwritten_by_itself(portal, tmp_path):
     done = convert([portal], tmp_path / "out")
     with pytest.raises(UserError, match="would be overwritten"):
         convert([done.written["us101"]], tmp_path / "out")
+
+
+def test_rows_of_other_sites_as_json_and_the_summary_of_what_was_written(portal, tmp_path):
+    done = merge_cosim("ngsim", "import", portal, "--out", "out", "--json", cwd=tmp_path)
+    written = json.loads(done.stdout)
+    assert written["elsewhere"] == {"lankershim": 1}
+    for name, file in written["written"].items():
+        (summary,) = json.loads(merge_cosim("ngsim", "summary", file, "--json", cwd=tmp_path).stdout)
+        assert (summary["site"], summary["pairs"]) == (name, 0)
+    assert "no row of i80 (it has us101)" in refused(
+        "ngsim", "summary", written["written"]["us101"], "--site", "i80", cwd=tmp_path
+    )

@@ -14,7 +14,7 @@ import pyarrow as pa
 
 import merge_cosim
 from merge_cosim.core.encounter import Encounters, Ragged
-from merge_cosim.core.files import cache_folder
+from merge_cosim.core.files import cache_folder, is_whole, keep
 from merge_cosim.ngsim.data import READER_VERSION, episode_files, load_trajectories
 from merge_cosim.ngsim.pairing.checks import without_failures
 from merge_cosim.ngsim.pairing.episodes import read_episodes
@@ -66,7 +66,7 @@ def site_pairs(
     choices = (repr(site), source, repr(rules), str(episodes_from), str(COMPLETE_CARS))
     key = "|".join([*_identity(data), *choices, *_versions()])
     cached = cache_folder("encounters") / f"{site.name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.parquet"
-    if cached.is_file():
+    if is_whole(cached):
         return read_pairs(cached)
     began = time.perf_counter()
     parts = list(_parts(data, site, rules, source, episodes_from))
@@ -74,7 +74,7 @@ def site_pairs(
         return None
     paired = without_failures(Paired.concatenate(parts))
     if time.perf_counter() - began > CACHE_FROM:
-        write_pairs(paired, cached)
+        keep(cached, lambda file: write_pairs(paired, file))
     return paired
 
 

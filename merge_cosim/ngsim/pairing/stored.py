@@ -1,8 +1,6 @@
 """Pairs as one Parquet file: a row per encounter, the logs as lists, what was rejected in the file's metadata."""
 
 import json
-import os
-import tempfile
 from dataclasses import fields
 from pathlib import Path
 
@@ -20,7 +18,7 @@ _CYCLES = ("change_cycle", "score_until")
 
 
 def write_pairs(paired: Paired, path: Path) -> None:
-    """Write `paired` to `path`, whole or not at all, so that no other process sees half a file."""
+    """Write `paired` to `path`."""
     log = paired.encounters.log
     if log is None:
         raise ValueError("these encounters have no log")
@@ -31,10 +29,7 @@ def write_pairs(paired: Paired, path: Path) -> None:
         columns[f"log.{name}"] = pa.LargeListArray.from_arrays(track.offsets, track.values)
     facts = {"merging_cars": paired.merging_cars, "rejected": dict(paired.rejected)}
     table = pa.table(columns).replace_schema_metadata({_FACTS: json.dumps(facts).encode()})
-    handle, made = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    os.close(handle)
-    pq.write_table(table, made)
-    os.replace(made, path)
+    pq.write_table(table, path)
 
 
 def read_pairs(path: Path) -> Paired:

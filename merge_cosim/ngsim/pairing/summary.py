@@ -12,6 +12,7 @@ import numpy as np
 from merge_cosim.core.encounter import Intention
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT
+from merge_cosim.ngsim.data import cached, episode_files
 from merge_cosim.ngsim.pairing.checks import HORIZON, replay_logged_host
 from merge_cosim.ngsim.pairing.encounters import site_pairs
 from merge_cosim.ngsim.pairing.pairs import Paired
@@ -129,13 +130,22 @@ def summarise_folder(data: Path, sites: Sequence[Site] = ()) -> list[Summary]:
     """
     if not data.exists():
         raise UserError(f"{data}: no such folder")
-    sites = sites or shipped_sites()
+    sites = sites or _sites_in(data)
     found = [(each, site_pairs(data, each)) for each in sites]
     summaries = [summarise(paired, each.name, each.source) for each, paired in found if paired is not None]
     if not summaries:
         names = " or ".join(each.name for each in sites)
         raise UserError(f"{data}: no trajectories of {names} that could make pairs; put their files there")
     return summaries
+
+
+def _sites_in(data: Path) -> Sequence[Site]:
+    """The shipped sites that a file of trajectories holds; all of them for a folder or a file of episodes."""
+    known = shipped_sites()
+    if data.is_dir() or episode_files(data):
+        return known
+    reading = cached(data)
+    return [each for each in known if each.name in reading.tables] or known
 
 
 def _ratio(total: float, count: float) -> float:

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from filelock import FileLock
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.files import cache_folder
+from merge_cosim.core.files import cache_folder, from_cache
 from merge_cosim.ngsim.sites import Site
 from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ngsim.surrogate.ngsim_format import ngsim_rows
@@ -49,16 +48,12 @@ def cached_surrogate(recipe: Recipe) -> Path:
     """Return the folder that holds what `generate` makes of a recipe, from the cache if it was made before."""
     ramp = Ramp.load(recipe.site)
     folder = cache_folder("surrogate") / f"{recipe.site}-{_key(recipe, ramp)}"
-    if folder.is_dir():
-        return folder
-    with FileLock(folder.with_suffix(".lock")):  # another process may be at it already
-        if not folder.is_dir():
-            with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-                made = Path(scratch) / "made"
-                made.mkdir()
-                generate(recipe, ramp, made / f"{recipe.site}-surrogate.parquet")
-                made.rename(folder)
-    return folder
+
+    def make(made: Path) -> None:
+        made.mkdir()
+        generate(recipe, ramp, made / f"{recipe.site}-surrogate.parquet")
+
+    return from_cache(folder, make)
 
 
 def generate(recipe: Recipe, ramp: Ramp, target: Path) -> None:

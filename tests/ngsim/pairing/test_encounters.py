@@ -67,7 +67,7 @@ def test_slow_pairs_are_cached_until_file_or_rules_change(tmp_path: Path, monkey
     monkeypatch.setattr(module, "CACHE_FROM", 0.0)
     first = site_pairs(data, US101)
     assert first is not None
-    (stored,) = (cache / "encounters").iterdir()
+    (stored,) = (cache / "encounters").glob("*.parquet")
     changed = stored.stat().st_mtime_ns
     second = site_pairs(data, US101)
     assert second is not None
@@ -76,7 +76,7 @@ def test_slow_pairs_are_cached_until_file_or_rules_change(tmp_path: Path, monkey
     site_pairs(data, US101, PairRules(max_window=2.5))
     os.utime(data / "a.parquet", ns=(1, 1))
     site_pairs(data, US101)
-    assert len(list((cache / "encounters").iterdir())) == 3
+    assert len(list((cache / "encounters").glob("*.parquet"))) == 3
 
 
 def test_a_surrogate_is_called_one(tmp_path: Path) -> None:
