@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 .PHONY: demo test coverage lint docs clean
 
 demo: $(VENV)/installed
-	$(BIN)/merge-cosim sweep designed-2 $(DEMO:%=--method %) --out out/demo
+	$(BIN)/merge-cosim sweep designed-2 $(DEMO:%=--method %) --out out/demo --overwrite
 	$(BIN)/merge-cosim report out/demo
 
 test: $(VENV)/installed

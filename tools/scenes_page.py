@@ -44,7 +44,7 @@ def run_all(base: SweepRequest, out: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     variations = [("full_scene.others", ["released"]), ("full_scene.heed_leader", [False])]
     rows, facts = [], []
     for name, varied in (("us101-replay", []), ("us101-scene", variations)):
-        sweep(replace(base, scenarios=[name], variations=varied), out / name, resume=True)
+        sweep(replace(base, scenarios=[name], variations=varied), out / name, resume=True, overwrite=True)
         rows.append(ResultFolder(out / name).results().to_pandas())
         if varied:
             facts.append(pd.read_csv(out / name / SCENES_CSV, keep_default_na=False))

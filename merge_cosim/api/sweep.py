@@ -35,6 +35,7 @@ def sweep(
     world: WorldKind = "sumo",
     out: str | Path | None = None,
     resume: bool = False,
+    overwrite: bool = False,
     progress: bool = True,
 ) -> Results:
     """Run every case of some scenarios under some methods.
@@ -64,6 +65,7 @@ def sweep(
         world: What moves the cars: `"sumo"`, or `"closed-form"` (`s' = s + v dt`, many times faster; pairs only).
         out: Result folder; a temporary one, kept as long as the returned object, if not given.
         resume: Finish an interrupted sweep in `out`; a finished one is read, not run again.
+        overwrite: Replace the sweep that `out` holds, finished or not.
         progress: Show how far the sweep is, on standard error.
 
     Returns:
@@ -90,5 +92,5 @@ def sweep(
     )
     results = Results(tempfile.mkdtemp(prefix="merge-cosim-"), temporary=True) if out is None else Results(out)
     with sweep_progress(progress) as told:
-        run_sweep(request, results.path, resume, told)
+        run_sweep(request, results.path, resume=resume, overwrite=overwrite, progress=told)
     return results

@@ -13,6 +13,7 @@ from merge_cosim import __version__
 from merge_cosim.cli import lists, ngsim, ramp, results
 from merge_cosim.cli.options import (
     Against,
+    Columns,
     Data,
     ForceSource,
     Jobs,
@@ -23,11 +24,12 @@ from merge_cosim.cli.options import (
     Scenario,
     Seed,
     Sets,
+    Wide,
     World,
     methods_like,
     scenarios_like,
 )
-from merge_cosim.cli.show import die, print_json, show_table, show_verification
+from merge_cosim.cli.show import die, print_json, show_results, show_table, show_verification
 from merge_cosim.core.errors import UserError
 
 app = typer.Typer(
@@ -40,13 +42,6 @@ app.add_typer(results.app)
 app.add_typer(lists.app)
 app.add_typer(ngsim.app, name="ngsim")
 app.add_typer(ramp.app, name="ramp")
-
-SHOWN_TRAFFIC = (
-    *("scenario", "variation", "method", "scenes", "throughput_veh_h", "mean_speed", "time_loss_s", "hosts"),
-    *("meetings", "meetings_scored", "merging_stopped", "host_contacts", "other_contacts", "emergency_brakings"),
-    *("cars", "released", "blocked", "driven_through"),
-)
-"""The same of the table of scenes; living traffic and full-scene replay have some of them each."""
 
 USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 """typer's UsageError; typer gives it no public name."""
@@ -92,18 +87,22 @@ def sweep(
     start: Annotated[Start, typer.Option(help="How processes are started.")] = "spawn",
     dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to run on, or 'local'.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Finish an interrupted sweep.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a sweep that is in the folder.")] = False,
     verify: Annotated[
         float | None, typer.Option(metavar="SHARE", help="Afterwards run this share of the rows again in SUMO.")
     ] = None,
+    wide: Wide = False,
+    columns: Columns = None,
     json: Json = False,
 ) -> None:
     """Run scenarios under methods and store one row per case."""
-    from merge_cosim.api.results import SHOWN
     from merge_cosim.api.sweep import sweep as run_sweep
     from merge_cosim.cli.interrupts import resumable
     from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
     from merge_cosim.scenarios.settings import parse_setting, parse_variation
 
+    if resume and overwrite:
+        raise UserError("--resume, --overwrite: choose one")
     with resumable(f"what was finished is kept in {out}; go on with --resume"):
         results = run_sweep(
             scenarios,
@@ -122,16 +121,12 @@ def sweep(
             world=world,
             out=out,
             resume=resume,
+            overwrite=overwrite,
         )
-    folder = ResultFolder(out)
     if json:
-        print_json({"summary": folder.read_json(SUMMARY_JSON), "manifest": results.manifest})
+        print_json({"summary": ResultFolder(out).read_json(SUMMARY_JSON), "manifest": results.manifest})
     else:
-        rows = [{name: row[name] for name in SHOWN} for row in folder.read_json(SUMMARY_JSON)]
-        show_table(rows, f"{out}: {', '.join(scenarios)} (world: {world})")
-        if traffic := folder.traffic():
-            shown = [name for name in SHOWN_TRAFFIC if name in traffic[0]]
-            show_table([{name: row[name] for name in shown} for row in traffic], "the traffic as a whole")
+        show_results(out, wide, columns)
     for line in results.notes():
         typer.echo(line, err=True)
     if verify is not None:
@@ -173,6 +168,7 @@ def run(
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
     from merge_cosim.api.run import run as run_case
+    from merge_cosim.report.story import story
     from merge_cosim.scenarios.settings import parse_setting
     from merge_cosim.sumo.outputs import SumoOutputs
 
@@ -196,8 +192,7 @@ def run(
     if json:
         print_json(row)
     else:
-        for name, value in row.items():
-            typer.echo(f"{name:18} {value}")
+        typer.echo("\n".join(story(row)))
 
 
 @app.command()

@@ -57,3 +57,8 @@ World = Annotated[
     typer.Option(help="What moves the cars: SUMO, or s' = s + v dt (many times faster; pairs only)."),
 ]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")]
+Wide = Annotated[bool, typer.Option("--wide", help="Show more columns than fit 80 characters.")]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(help="Columns of summary.csv to show, as a,b,c or by repetition.", callback=_names),
+]

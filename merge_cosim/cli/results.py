@@ -1,12 +1,25 @@
-"""`merge-cosim report`, `compare`, `verify`, `reproduce`, `bounds` and `bench`: results and what is made from them."""
+"""`merge-cosim report`, `summary`, `compare`, `verify`, `reproduce`, `bounds` and `bench`: what is made of results."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from merge_cosim.cli.options import Against, Data, ForceSource, Jobs, Json, Model, Plugins, Seed, Sets, World
-from merge_cosim.cli.show import print_json, show_table, show_verification
+from merge_cosim.cli.options import (
+    Against,
+    Columns,
+    Data,
+    ForceSource,
+    Jobs,
+    Json,
+    Model,
+    Plugins,
+    Seed,
+    Sets,
+    Wide,
+    World,
+)
+from merge_cosim.cli.show import print_json, show_results, show_table, show_verification
 
 app = typer.Typer()
 
@@ -25,6 +38,22 @@ def report(
         print_json({"report": str(file)})
     else:
         typer.echo(file)
+
+
+@app.command()
+def summary(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
+    wide: Wide = False,
+    columns: Columns = None,
+    json: Json = False,
+) -> None:
+    """Show the table and the verdict of a finished sweep again."""
+    from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
+
+    if json:
+        print_json(ResultFolder(folder).read_json(SUMMARY_JSON))
+    else:
+        show_results(folder, wide, columns)
 
 
 @app.command()

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 MISSING = "–"
-LATEX_SIGNS = {"−": "$-$", "–": "--", "µ": r"$\mu$", "≥": r"$\geq$", "²": "$^2$"}
+LATEX_SIGNS = {"−": "$-$", "–": "--", "µ": r"$\mu$", "≥": r"$\geq$", "²": "$^2$", "<": "$<$"}
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class Column:
         decimals: Digits after the point; None for text.
         group: Heading above several neighbouring columns.
         prose: Sentences, set to the left and wrapped.
+        range: Texts that are ranges of numbers.
+        probability: A p value, never written as zero: `<0.001`.
     """
 
     name: str
@@ -29,6 +31,13 @@ class Column:
     decimals: int | None = None
     group: str = ""
     prose: bool = False
+    range: bool = False
+    probability: bool = False
+
+    @property
+    def is_text(self) -> bool:
+        """It holds names or sentences; ranges are numbers."""
+        return self.decimals is None and not self.range
 
     def text(self, value: Any) -> str:
         """Write one value."""
@@ -36,6 +45,8 @@ class Column:
             return MISSING
         if self.decimals is None:
             return str(value)
+        if self.probability and value < 10**-self.decimals:
+            return f"<{10**-self.decimals:.{self.decimals}f}"
         rounded = round(float(value), self.decimals) + 0.0  # no minus before a zero
         return f"{rounded:,.{self.decimals}f}".replace("-", "−")
 

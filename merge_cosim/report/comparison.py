@@ -64,7 +64,7 @@ def compare(first: Path, second: Path, methods: tuple[str, str] | None = None) -
         Column("n", "n", 0, "common cases"),
         *(Column(f"failure_pct_{side}", f"{side.upper()} %", 2, "failures") for side in "ab"),
         *(Column(f"only_{side}", f"only {side.upper()}", 0, "failures") for side in "ab"),
-        Column("p", "McNemar p", 3, "failures"),
+        Column("p", "McNemar p", 3, "failures", probability=True),
         *(
             Column(f"{name}_{side}", heading, 2, title)
             for name, title in MEASURES.items()

@@ -53,7 +53,7 @@ def safety_table(summary: pd.DataFrame, section: Section) -> Table:
     compared = (
         Column("only_this_fails", "only this fails", 0, group),
         Column("only_other_fails", "only that fails", 0, group),
-        Column("mcnemar_p", "McNemar p", 4, group),
+        Column("mcnemar_p", "McNemar p", 4, group, probability=True),
     )
     title = "Surrogate safety, and failures on the same cases"
     return Table.of(rows, (*SAFETY, *compared), list(map(is_reference, rows["method"])), title)

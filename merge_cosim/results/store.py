@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
@@ -59,27 +59,45 @@ class ResultFolder:
         self._parts = path / "parts"
         self._plan = self._parts / "plan.json"
 
-    def begin(self, plan: dict[str, Any], resume: bool) -> None:
+    def begin(self, plan: dict[str, Any], resume: bool = False, overwrite: bool = False) -> None:
         """Make ready for a sweep; parts of an interrupted one are kept if it was the same and is to be resumed.
 
+        Args:
+            plan: What makes it the same sweep.
+            resume: Go on with an unfinished one.
+            overwrite: Replace a finished one and, without `resume`, an unfinished one.
+
         Raises:
-            UserError: There are parts and nothing says what to do with them, or they belong to another sweep.
+            UserError: There is a sweep and nothing says what to do with it, or it is another one than the one to go on.
         """
         if self.path.exists() and not self.path.is_dir():
             raise UserError(f"{self.path}: is a file; --out names a folder")
         if self._plan.is_file():
-            if not resume:
+            if not (resume or overwrite):
                 raise UserError(
-                    f"{self.path}: holds an unfinished sweep; if that runs no more, add --resume to finish it, or "
-                    f"choose another --out"
+                    f"{self.path}: holds an unfinished sweep; if that runs no more, add --resume to finish it or "
+                    f"--overwrite to replace it, or choose another --out"
                 )
-            before = _read_json(self._plan)
-            changed = sorted(key for key in plan if plan[key] != before.get(key))
+            changed = _changed(plan, _read_json(self._plan)) if resume else []
             if changed:
                 raise UserError(
                     f"{self.path}: the interrupted sweep was another one ({', '.join(changed)} changed); "
                     f"repeat its command with --resume, or choose another --out"
                 )
+        elif (self.path / MANIFEST).is_file() and not overwrite:
+            if resume:
+                changed = _changed(plan, self.read_json(MANIFEST))
+                raise UserError(
+                    f"{self.path}: holds a finished sweep, which was another one ({', '.join(changed)} changed); "
+                    f"--overwrite replaces it, or choose another --out"
+                )
+            raise UserError(
+                f"{self.path}: holds a finished sweep; --overwrite replaces it, --resume keeps it if it is the same; "
+                f"or choose another --out"
+            )
+        if not (resume and self._plan.is_file()):
+            for part in self._parts.glob("*.parquet"):  # of a sweep that is replaced
+                part.unlink()
         self._parts.mkdir(parents=True, exist_ok=True)
         _write_text(self._plan, json.dumps(plan, indent=1))
 
@@ -87,8 +105,7 @@ class ResultFolder:
         """Whether a finished sweep of this plan is here."""
         if self._plan.is_file() or not (self.path / MANIFEST).is_file():
             return False
-        manifest = self.read_json(MANIFEST)
-        return all(manifest.get(key) == value for key, value in json.loads(json.dumps(plan)).items())
+        return not _changed(plan, self.read_json(MANIFEST))
 
     def done(self) -> set[str]:
         """Names of the batches whose parts are there, and can be read."""
@@ -215,8 +232,8 @@ class ResultFolder:
             file.unlink()
         self._parts.rmdir()
 
-    def results(self) -> pa.Table:
-        """Read the rows of a finished sweep.
+    def results(self, columns: Sequence[str] | None = None) -> pa.Table:
+        """Read the rows of a finished sweep, or some columns of them.
 
         Raises:
             UserError: There are none, a sweep into this folder is not finished, or another version wrote them.
@@ -226,7 +243,7 @@ class ResultFolder:
             raise UserError(f"{self.path}: holds an unfinished sweep; if that runs no more, finish it with --resume")
         if not file.is_file():
             raise UserError(f"{file}: no results here; run a sweep first")
-        rows = _read_table(file)
+        rows = _read_table(file, columns)
         version = (rows.schema.metadata or {}).get(VERSION_KEY, b"none").decode()
         if version != SCHEMA_VERSION:
             raise UserError(f"{file}: result schema {version}, expected {SCHEMA_VERSION}; run the sweep again")
@@ -246,6 +263,11 @@ def with_scene_facts(rows: pa.Table, facts: list[dict[str, Any]]) -> pa.Table:
     return rows.replace_schema_metadata({**(SCHEMA.metadata or {}), SCENE_FACTS: json.dumps(facts)})
 
 
+def _changed(plan: dict[str, Any], before: dict[str, Any]) -> list[str]:
+    """What differs between a plan and the one before."""
+    return sorted(key for key, value in json.loads(json.dumps(plan)).items() if before.get(key) != value)
+
+
 def _csv_rows(file: Path) -> list[dict[str, Any]]:
     if not file.is_file():
         return []
@@ -261,9 +283,9 @@ def _is_whole(file: Path) -> bool:
     return True
 
 
-def _read_table(file: Path) -> pa.Table:
+def _read_table(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
     try:
-        return pq.read_table(file)
+        return pq.read_table(file, columns=columns)
     except FileNotFoundError:
         raise UserError(f"{file}: missing; run the sweep again") from None
     except (pa.ArrowInvalid, OSError) as error:

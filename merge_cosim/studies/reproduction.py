@@ -69,7 +69,7 @@ def run(found: Sequence[Study], out: Path, say: Say | None = None) -> None:
             if say:
                 say(done, total, f"{lead}: {what}")
 
-        sweep(study.request, out / study.name, resume=True, progress=tell)
+        sweep(study.request, out / study.name, resume=True, overwrite=True, progress=tell)
 
 
 def studies(

@@ -52,13 +52,20 @@ class _Tally:
         self.by_method.setdefault(method, Effort()).add(effort)
 
 
-def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Progress | None = None) -> dict[str, Any]:
+def sweep(
+    request: SweepRequest,
+    out: Path,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
     """Run a sweep and write its result folder; returns the manifest.
 
     Args:
         request: What to run.
         out: Result folder.
         resume: Finish an interrupted sweep; a finished one is left as it is.
+        overwrite: Replace what the folder holds; with `resume`, a finished sweep of another request.
         progress: Told how far it is.
 
     Raises:
@@ -71,7 +78,7 @@ def sweep(request: SweepRequest, out: Path, resume: bool = False, progress: Prog
     if resume and folder.holds(what):
         manifest: dict[str, Any] = folder.read_json(MANIFEST)
         return manifest
-    folder.begin(what, resume)
+    folder.begin(what, resume, overwrite)
     planned = perf_counter()
     tally = _run(request, list(cut(tasks)), folder, progress)
     ran = perf_counter()

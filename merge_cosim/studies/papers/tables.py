@@ -103,7 +103,7 @@ def outcomes(evidence: Evidence) -> dict[str, Table]:
         [
             Column("only_this_fails", "only this fails", 0),
             Column("only_other_fails", "only pgm fails", 0),
-            Column("mcnemar_p", "p", 4),
+            Column("mcnemar_p", "p", 4, probability=True),
         ],
     )
     return {

@@ -1,0 +1,100 @@
+"""What a sweep and a case look like in a terminal of 80 columns."""
+
+import json
+from itertools import pairwise
+
+import pytest
+from command import merge_cosim, refused, small_scenario
+
+from merge_cosim.scenarios.methods import is_reference
+
+WIDTH = 80
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """A folder with a sweep of all methods, one of a single one, and what the first printed."""
+    folder = tmp_path_factory.mktemp("swept")
+    small_scenario(folder)
+    closed = ("sweep", "small.toml", "--world", "closed-form")
+    every = merge_cosim(*closed, "--out", "every", cwd=folder)
+    assert every.returncode == 0, every.stderr
+    assert merge_cosim(*closed, "--method", "acc", "--out", "one", cwd=folder).returncode == 0
+    return folder, every.stdout
+
+
+def rows_of(printed):
+    """The table's rows as words: between the rule below the headings and the next, and from there to the last."""
+    lines = printed.splitlines()
+    rules = [number for number, line in enumerate(lines) if line.strip().startswith("───")]
+    return [[line.split() for line in lines[first + 1 : last]] for first, last in pairwise(rules[1:])]
+
+
+def test_all_methods_fit_80_columns(swept):
+    folder, printed = swept
+    assert max(map(len, printed.splitlines())) <= WIDTH
+    title = printed.splitlines()[0]
+    assert title == "small (designed, world closed-form, cases each: 75)"
+    methods, references = rows_of(printed)
+    assert [is_reference(row[0]) for row in methods + references] == [False] * len(methods) + [True] * len(references)
+    summary = json.loads((folder / "every/summary.json").read_text())
+    by = {row["method"]: (row["failed_or_stuck_pct"], row["delay_s"]) for row in summary}
+    assert [row[0] for row in methods] == sorted((m for m in by if not is_reference(m)), key=lambda m: by[m])
+    least = min(row["delay_s"] for row in summary if not is_reference(row["method"]))
+    assert sum(f"{least:.2f}*" in row for row in methods) == 1
+    assert "*" not in str(references)
+    assert f"{methods[0][0]}" in printed.split("references\n")[1]
+    assert "least: " in printed
+
+
+def test_one_method_fits_and_has_nothing_to_be_best_of(swept):
+    folder, _ = swept
+    printed = merge_cosim("summary", "one", cwd=folder).stdout
+    assert max(map(len, printed.splitlines())) <= WIDTH
+    assert "*" not in printed
+    assert "No other method to compare with." in " ".join(printed.split())
+
+
+def test_more_columns_and_chosen_ones(swept):
+    folder, _ = swept
+    wide = merge_cosim("summary", "every", "--wide", cwd=folder).stdout
+    assert "needless" in wide
+    chosen = merge_cosim("summary", "every", "--columns", "failures,gap_m", cwd=folder).stdout
+    assert chosen.splitlines()[2].split() == ["method", "failed", "gap_m"]
+    assert json.loads(merge_cosim("summary", "every", "--json", cwd=folder).stdout)[0]["n"] == 75
+    assert "did you mean 'gap_m'" in refused("summary", "every", "--columns", "gap", cwd=folder)
+
+
+def test_a_varied_parameter_heads_the_column_of_its_values(tmp_path):
+    small_scenario(tmp_path)
+    arguments = ("--world", "closed-form", "--method", "acc", "--vary", "acc.headway=10,2", "--out", "out")
+    printed = merge_cosim("sweep", "small.toml", *arguments, cwd=tmp_path).stdout
+    assert printed.splitlines()[2].split()[:2] == ["acc.headway", "method"]
+    (rows,) = rows_of(printed)
+    assert [row[0] for row in rows] == ["–", "10", "2"]  # as the user gave them
+    assert "Without variation: acc" in printed
+
+
+def test_a_finished_sweep_is_never_replaced_unasked(swept):
+    folder, _ = swept
+    before = (folder / "one/results.parquet").read_bytes()
+    again = ("sweep", "small.toml", "--world", "closed-form", "--out", "one", "--method")
+    assert "holds a finished sweep; --overwrite replaces it" in refused(*again, "acc", cwd=folder)
+    assert "another one (methods, parameters changed)" in refused(*again, "slot", "--resume", cwd=folder)
+    assert "choose one" in refused(*again, "slot", "--resume", "--overwrite", cwd=folder)
+    assert (folder / "one/results.parquet").read_bytes() == before
+    assert merge_cosim(*again, "acc", "--resume", cwd=folder).returncode == 0  # the same one: kept
+    assert merge_cosim(*again, "acc", "--set", "acc.headway=0.5", "--overwrite", cwd=folder).returncode == 0
+    assert (folder / "one/results.parquet").read_bytes() != before
+
+
+def test_a_case_is_told_in_five_lines(swept):
+    folder, _ = swept
+    run = ("run", "small.toml", "--world", "closed-form", "--method", "acc", "--case")
+    title, start, merge, result, cost = merge_cosim(*run, "d+0_h15_m15", cwd=folder).stdout.splitlines()
+    assert title == "small d+0_h15_m15, designed: acc in closed-form"
+    assert start.split()[:4] == ["start", "host", "-90.0", "m,"]
+    assert merge.startswith("merge   ")
+    assert result.startswith("result  no failure") or "FAILED" in result
+    assert cost.startswith("cost    delay ")
+    assert max(map(len, (title, start, merge, result, cost))) <= WIDTH
