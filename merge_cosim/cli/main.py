@@ -16,6 +16,7 @@ from merge_cosim.cli.options import (
     Columns,
     Data,
     ForceSource,
+    Host,
     Jobs,
     Json,
     Methods,
@@ -29,7 +30,7 @@ from merge_cosim.cli.options import (
     methods_like,
     scenarios_like,
 )
-from merge_cosim.cli.show import die, print_json, show_results, show_table, show_verification
+from merge_cosim.cli.show import die, print_json, show_results, show_table, show_verification, verification
 from merge_cosim.core.errors import UserError
 
 app = typer.Typer(
@@ -80,6 +81,7 @@ def sweep(
     source: ForceSource = None,
     seed: Seed = 0,
     world: World = "sumo",
+    host: Host = None,
     plugin: Plugins = None,
     against: Against = None,
     out: Annotated[Path, typer.Option(help="Result folder.")] = Path("out"),
@@ -108,7 +110,7 @@ def sweep(
             scenarios,
             method,
             model=model,
-            settings=dict(map(parse_setting, set_ or ())),
+            settings=dict(map(parse_setting, set_ or ())) | ({"host": host} if host else {}),
             vary=_joined(map(parse_variation, vary or ())),
             data=data,
             source=source,
@@ -123,14 +125,21 @@ def sweep(
             resume=resume,
             overwrite=overwrite,
         )
+        again = (
+            None if verify is None else results.verify(verify, data=data, model=model, plugins=plugin or (), jobs=jobs)
+        )
     if json:
-        print_json({"summary": ResultFolder(out).read_json(SUMMARY_JSON), "manifest": results.manifest})
+        document = {"summary": ResultFolder(out).read_json(SUMMARY_JSON), "manifest": results.manifest}
+        print_json(document | ({"verification": verification(again)} if again else {}))
     else:
         show_results(out, wide, columns)
     for line in results.notes():
         typer.echo(line, err=True)
-    if verify is not None:
-        show_verification(results.verify(verify, data=data, model=model, plugins=plugin or (), jobs=jobs), json)
+    if again:
+        if not json:
+            show_verification(again)
+        if again.beyond:
+            raise typer.Exit(1)
 
 
 def _joined(varied: Iterable[tuple[str, list[Any]]]) -> dict[str, list[Any]]:
@@ -152,6 +161,7 @@ def run(
     source: ForceSource = None,
     seed: Seed = 0,
     world: World = "sumo",
+    host: Host = None,
     plugin: Plugins = None,
     gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui.")] = False,
     delay: Annotated[int, typer.Option(min=0, help="With --gui: milliseconds per step; 100 is real time.")] = 100,
@@ -177,7 +187,7 @@ def run(
         case,
         method,
         model=model,
-        settings=dict(map(parse_setting, set_ or ())),
+        settings=dict(map(parse_setting, set_ or ())) | ({"host": host} if host else {}),
         data=data,
         source=source,
         seed=seed,

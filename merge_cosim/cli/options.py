@@ -56,6 +56,10 @@ World = Annotated[
     Literal["sumo", "closed-form"],
     typer.Option(help="What moves the cars: SUMO, or s' = s + v dt (many times faster; pairs only)."),
 ]
+Host = Annotated[
+    Literal["main", "ramp"] | None,
+    typer.Option(help="Where the automated car drives, with the other car on the other path; as --set host=..."),
+]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")]
 Wide = Annotated[bool, typer.Option("--wide", help="Show more columns than fit 80 characters.")]
 Columns = Annotated[

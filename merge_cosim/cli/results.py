@@ -19,7 +19,7 @@ from merge_cosim.cli.options import (
     Wide,
     World,
 )
-from merge_cosim.cli.show import print_json, show_results, show_table, show_verification
+from merge_cosim.cli.show import print_json, show_results, show_table, show_verification, verification
 
 app = typer.Typer()
 
@@ -100,7 +100,12 @@ def verify(
     found = Results(folder).verify(
         share, seed=seed, data=data, model=model, plugins=plugin or (), jobs=jobs, tolerance=tolerance
     )
-    show_verification(found, json)
+    if json:
+        print_json(verification(found))
+    else:
+        show_verification(found)
+    if found.beyond:
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -38,18 +38,18 @@ def die(message: str) -> NoReturn:
     sys.exit(2)
 
 
-def show_verification(found: Verification, json: bool = False) -> None:
-    """Print what came out of running rows again, and end with status 1 if values differ beyond the tolerance."""
+def verification(found: Verification) -> dict[str, Any]:
+    """What came out of running rows again, as a document."""
     rows = found.differences.astype(object).where(found.differences.notna(), None).to_dict("records")
-    if json:
-        print_json({"rows": found.rows, "beyond": found.beyond, "differences": rows, "notes": found.notes})
-    else:
-        if rows:
-            show_table([{str(name): _exact(value) for name, value in row.items()} for row in rows], "what differs")
-        for line in (*found.notes, str(found)):
-            print(line)
-    if found.beyond:
-        sys.exit(1)
+    return {"rows": found.rows, "beyond": found.beyond, "differences": rows, "notes": found.notes}
+
+
+def show_verification(found: Verification) -> None:
+    """Print what came out of running rows again."""
+    if rows := verification(found)["differences"]:
+        show_table([{str(name): _exact(value) for name, value in row.items()} for row in rows], "what differs")
+    for line in (*found.notes, str(found)):
+        print(line)
 
 
 def _exact(value: Any) -> Any:

@@ -79,6 +79,8 @@ class ReplayLog:
         change_cycle: Cycle of the merging car's lane change, shape (n,).
         score_until: Last cycle that may be scored, because a logged car leaves the host lane after it; `NEVER` where
             a log ends in the host lane (then the merging car is continued at constant speed). Shape (n,).
+        host_speed: The human host's speed as an estimator may observe it [m/s], lengths of `host_station`; None where
+            it is not known.
     """
 
     merging_station: Ragged
@@ -86,6 +88,7 @@ class ReplayLog:
     host_station: Ragged
     change_cycle: IntArray
     score_until: IntArray
+    host_speed: Ragged | None = None
 
     def take(self, rows: IntArray) -> ReplayLog:
         """Return the chosen encounters' logs."""
@@ -95,17 +98,36 @@ class ReplayLog:
             self.host_station.take(rows),
             self.change_cycle[rows],
             self.score_until[rows],
+            None if self.host_speed is None else self.host_speed.take(rows),
         )
 
     @staticmethod
     def concatenate(logs: Sequence[ReplayLog]) -> ReplayLog:
         """Join batches of logs."""
+        speeds = [log.host_speed for log in logs if log.host_speed is not None]
         return ReplayLog(
             Ragged.concatenate([log.merging_station for log in logs]),
             Ragged.concatenate([log.merging_speed for log in logs]),
             Ragged.concatenate([log.host_station for log in logs]),
             np.concatenate([log.change_cycle for log in logs]),
             np.concatenate([log.score_until for log in logs]),
+            Ragged.concatenate(speeds) if len(speeds) == len(logs) else None,
+        )
+
+    def swapped(self) -> ReplayLog:
+        """The same logs with the two cars in each other's place.
+
+        Raises:
+            ValueError: The observable speed of the logged host is not known.
+        """
+        if self.host_speed is None:
+            raise ValueError("these logs have no observable speed of the host")
+        return replace(
+            self,
+            merging_station=self.host_station,
+            merging_speed=self.host_speed,
+            host_station=self.merging_station,
+            host_speed=self.merging_speed,
         )
 
 
@@ -205,6 +227,24 @@ class Encounters:
         """Return the encounters `first` to `last - 1`, as views where that can be."""
         arrays = {f.name: getattr(self, f.name)[first:last] for f in fields(self) if f.name != "log"}
         return replace(self, **arrays, log=None if self.log is None else self.log.take(np.arange(first, last)))
+
+    def swapped(self) -> Encounters:
+        """The same encounters with the two cars in each other's place: the host is the car from the ramp.
+
+        The intention is that of the car on the main road: the other one's opposite.
+        """
+        opposite = np.array([Intention.NOT_YIELD, Intention.YIELD, Intention.UNKNOWN], dtype=np.int64)
+        return replace(
+            self,
+            host_station=self.merging_station,
+            host_speed=self.merging_speed,
+            host_length=self.merging_length,
+            merging_station=self.host_station,
+            merging_speed=self.host_speed,
+            merging_length=self.host_length,
+            label=opposite[self.label],
+            log=None if self.log is None else self.log.swapped(),
+        )
 
     @cached_property
     def digest(self) -> str:

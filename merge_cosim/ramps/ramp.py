@@ -135,14 +135,18 @@ class Ramp:
 
     @property
     def main_route(self) -> tuple[str, ...]:
-        """Edge ids of the host's route."""
+        """Edge ids of the main road's route."""
         return tuple(section.edge for section in self.main)
 
     @property
     def ramp_route(self) -> tuple[str, ...]:
-        """Edge ids of the merging car's route, which ends where the host's does."""
+        """Edge ids of the on-ramp's route, which ends where the main road's does."""
         own = tuple(section.edge for section in self.ramp if section.end <= 0.0)
         return own + tuple(section.edge for section in self.main if section.start >= 0.0)
+
+    def route(self, path: Way) -> tuple[str, ...]:
+        """Edge ids of a path's route."""
+        return self.main_route if path == "main" else self.ramp_route
 
     def lanes_of(self, *edges: str) -> tuple[str, ...]:
         """SUMO ids of the lanes of some edges, from the right."""
@@ -154,11 +158,17 @@ class Ramp:
         outgoing = read_net(self.net).getEdge(edge).getLane(lane).getOutgoing()
         return tuple(sorted({str(link.getTo().getID()) for link in outgoing}))
 
-    def holds(self, merge_position: FloatArray, host_station: FloatArray, merging_station: FloatArray) -> BoolArray:
-        """Which encounters fit: merging point beside the ramp's lane, both starts on the net; shape (n,)."""
+    def holds(self, merge_position: FloatArray, on_main: FloatArray, on_ramp: FloatArray) -> BoolArray:
+        """Which encounters fit: merging point beside the ramp's lane, both starts on the net; shape (n,).
+
+        Args:
+            merge_position: Where station 0 lies [m past the gore], shape (n,).
+            on_main: Stations at the start of the cars on the main road [m], shape (n,).
+            on_ramp: The same of the cars on the ramp.
+        """
         beside = (merge_position >= 0.0) & (merge_position <= self.auxiliary_end)
-        host, merging = host_station + merge_position, merging_station + merge_position
-        on_net = (host >= self.main[0].start) & (merging >= self.ramp[0].start) & (host < self.downstream)
+        main, ramp = on_main + merge_position, on_ramp + merge_position
+        on_net = (main >= self.main[0].start) & (ramp >= self.ramp[0].start) & (main < self.downstream)
         return np.asarray(beside & on_net)
 
 

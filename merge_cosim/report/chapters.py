@@ -134,6 +134,8 @@ def _notes(section: Section, rows: pd.DataFrame, scenario: dict[str, Any], manif
             f"Only the initial states come from {SOURCES.get(section.source, section.source)}; the merging car drives "
             f"by the model '{scenario['merging']['model']}'."
         )
+    if scenario.get("host") == "ramp":
+        notes.append("The host drives on the ramp; what is said of the merging car is of the car on the main road.")
     left_out = manifest.get("left_out", {}).get(section.scenario, [])
     if left_out:
         notes.append(f"{len(left_out)} cases of the scenario do not fit on the ramp and were left out.")

@@ -48,7 +48,7 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
     if isinstance(scenario.encounters, Table):
         return _table(scenario.encounters, scenario.name)
     if isinstance(scenario.encounters, Routes):
-        return read_sumocfg(scenario.encounters.file)[1]
+        return read_sumocfg(scenario.encounters.file, scenario.host)[1]
     if isinstance(scenario.encounters, Traffic):
         raise UserError(f"scenario {scenario.name}: it is living traffic and has no encounters of its own")
     parts = [
@@ -58,6 +58,8 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
     encounters = Encounters.concatenate(parts)
     if scenario.encounters.merge_point == "site":
         encounters = at_site_point(encounters)
+    if scenario.host == "ramp":
+        encounters = encounters.swapped()
     if scenario.is_replay:
         return encounters
     nothing = np.full(len(encounters), int(Intention.UNKNOWN))

@@ -23,7 +23,7 @@ from merge_cosim.core.files import shipped
 from merge_cosim.core.registry import did_you_mean, parameters
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 from merge_cosim.ngsim.pairing.rules import PairRules
-from merge_cosim.ramps.ramp import ramp_names
+from merge_cosim.ramps.ramp import Way, ramp_names
 from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Span, Strict, Table, Traffic
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.sensors.base import Sensor, sensors
@@ -51,6 +51,8 @@ class Scenario(Strict):
         full_scene: How all other logged cars take part; None for host and merging car alone.
         test: How an encounter is scored.
         speed_limit: Speed limit [m/s]; the ramp's own if not given.
+        host: Where the automated car, the host, drives: on the `main` road or on the `ramp`. The other car, which the
+            results call the merging car, is on the other path.
         name: Name of the scenario, that of its file.
     """
 
@@ -63,6 +65,7 @@ class Scenario(Strict):
     full_scene: FullScene | None = None
     test: Rules = Rules()
     speed_limit: PositiveFloat | None = None
+    host: Way = "main"
     name: str
 
     def merging_car(self) -> MergingCar:
@@ -95,7 +98,17 @@ class Scenario(Strict):
                 raise ValueError("full_scene needs logged cars: encounters.kind = 'pairs' and merging.model = 'replay'")
             if self.encounters.merge_point != "car":
                 raise ValueError("full_scene needs encounters.merge_point = 'car', where the logged lane changes are")
+        if self.host == "ramp":
+            if self.is_scene or self.full_scene is not None:
+                raise ValueError("host = 'ramp' is for two cars alone; leave out full_scene, and traffic")
+            if self.test.overlap_from == "lane_change":
+                raise ValueError("host = 'ramp': test.overlap_from must be 'both', as the other car changes no lane")
         return self
+
+    @property
+    def other(self) -> Way:
+        """The path of the other car."""
+        return "ramp" if self.host == "main" else "main"
 
     @property
     def is_scene(self) -> bool:
@@ -106,7 +119,7 @@ class Scenario(Strict):
     def encounters_key(self) -> str:
         """What its encounters depend on: scenarios with the same key share them."""
         script = self.merging if isinstance(self.encounters, ByArrival) else self.is_replay
-        return repr((self.encounters, script, self.ramp))
+        return repr((self.encounters, script, self.ramp, self.host))
 
     @property
     def is_replay(self) -> bool:
@@ -116,7 +129,7 @@ class Scenario(Strict):
 
 SUMO_SUFFIXES = (".sumocfg", ".cfg")
 """Endings of SUMO's configurations; the second is what older ones are called."""
-SECTIONS = ("ramp", "encounters", "merging", "sensing", "full_scene", "test", "speed_limit")
+SECTIONS = ("ramp", "encounters", "merging", "sensing", "full_scene", "test", "speed_limit", "host")
 """What of a scenario can be set or varied from the command line."""
 
 

@@ -162,13 +162,13 @@ class LaneMap:
 class AlongPaths:
     """x of many cars that drive along the two paths, from their lane positions alone.
 
-    The first half of the rows drive on the main path, the second half on the ramp's. Cars never back up, so a lane
+    The first half of the rows drive on one of the paths, the second half on the other. Cars never back up, so a lane
     position that has become smaller is on the next edge.
     """
 
-    def __init__(self, ramp: Ramp, count: int) -> None:
-        """Start with all cars on the first edges; `count` is the number of cars on each path."""
-        lanes, routes = LaneMap(ramp), (ramp.main_route, ramp.ramp_route)
+    def __init__(self, ramp: Ramp, count: int, paths: tuple[Way, Way] = ("main", "ramp")) -> None:
+        """Start with all cars on the first edges; `count` is the number of cars on each of the paths."""
+        lanes, routes = LaneMap(ramp), [ramp.route(path) for path in paths]
         self._starts = np.array([lanes.start(edge) for route in routes for edge in route])
         before = (0, len(routes[0]))
         self._numbers = [{edge: first + i for i, edge in enumerate(r)} for first, r in zip(before, routes, strict=True)]

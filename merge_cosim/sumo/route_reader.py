@@ -13,7 +13,7 @@ from lxml import etree
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import TOLERANCE
-from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.sumo.configuration import DEFAULT_TYPE, Configuration, parse
 from merge_cosim.sumo.lane_map import LaneMap, LanePosition
 from merge_cosim.sumo.vehicle_types import MERGE_POSITION, ROLE
@@ -22,7 +22,8 @@ ROLES = ("host", "merging")
 DEFAULT_LENGTH = 5.0
 """Length of SUMO's default passenger car [m]."""
 
-_PATHS = {"host": ("along the main road", "host's lane"), "merging": ("over the on-ramp", "merging car's lane")}
+_COMES: dict[Way, str] = {"main": "along the main road", "ramp": "over the on-ramp"}
+_LANES = {"host": "host's lane", "merging": "merging car's lane"}
 _NO_TYPE = etree.Element("vType")
 
 
@@ -49,12 +50,13 @@ def only_pairs(configuration: Configuration) -> bool:
     return 0 < everything == len(entries) and host == merging
 
 
-def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
+def read_sumocfg(file: Path, host: Way = "main") -> tuple[Ramp, Encounters]:
     """Read the ramp and the encounters of a `.sumocfg`.
 
     Its net must be that of a ramp (`ramp.toml` lies beside it). The k-th car with the role `host` meets the k-th with
     the role `merging`, in the order of the route files; their start is given by departure edge, position and speed, as
-    numbers. A host's route leads along the main road, a merging car's over the on-ramp. Other cars are passed over.
+    numbers. A host's route leads along the main road, a merging car's over the on-ramp, or the other way round where
+    `host` is `ramp`. Other cars are passed over.
 
     Raises:
         UserError: A file is missing or no XML, or a car cannot be understood or is routed elsewhere.
@@ -76,41 +78,43 @@ def read_sumocfg(file: Path) -> tuple[Ramp, Encounters]:
     names = [f"{host.name}_{car.name}" for host, car in zip(hosts, merging, strict=True)]
     if twice := [name for name in names if names.count(name) > 1]:
         raise UserError(f"{file}: two encounters are called '{twice[0]}'; give each vehicle an id of its own")
+    other: Way = "ramp" if host == "main" else "main"
     return ramp, Encounters.unlogged(
         np.array(names),
         ramp.name,
         "designed",
-        host_station=_stations(ramp, "host", hosts, merge_position),
+        host_station=_stations(ramp, "host", host, hosts, merge_position),
         host_speed=np.array([car.speed for car in hosts]),
         host_length=np.array([car.length for car in hosts]),
-        merging_station=_stations(ramp, "merging", merging, merge_position),
+        merging_station=_stations(ramp, "merging", other, merging, merge_position),
         merging_speed=np.array([car.speed for car in merging]),
         merging_length=np.array([car.length for car in merging]),
         merge_position=merge_position,
     )
 
 
-def _stations(ramp: Ramp, role: str, cars: list[_Car], merge_position: np.ndarray) -> np.ndarray:
+def _stations(ramp: Ramp, role: str, path: Way, cars: list[_Car], merge_position: np.ndarray) -> np.ndarray:
     """Stations of cars of one role at their start [m]."""
     lanes = LaneMap(ramp)
-    found = [lanes.station(_start(ramp, role, car), float(at)) for car, at in zip(cars, merge_position, strict=True)]
+    found = [
+        lanes.station(_start(ramp, role, path, car), float(at)) for car, at in zip(cars, merge_position, strict=True)
+    ]
     return np.array(found)
 
 
-def _start(ramp: Ramp, role: str, car: _Car) -> LanePosition:
+def _start(ramp: Ramp, role: str, path: Way, car: _Car) -> LanePosition:
     """Where a car starts, after making sure that it drives as its role says."""
-    edge, (way, path) = car.route[0], _PATHS[role]
-    route = ramp.main_route if role == "host" else ramp.ramp_route
+    edge, route = car.route[0], ramp.route(path)
     along = route[route.index(edge) :] if edge in route else ()
     if not along or any(mine != theirs for mine, theirs in zip(car.route, along, strict=False)):
         raise UserError(
-            f"{car.where}: its route is '{' '.join(car.route)}'; a {role} car comes {way}: {' '.join(route)}"
+            f"{car.where}: its route is '{' '.join(car.route)}'; a {role} car comes {_COMES[path]}: {' '.join(route)}"
         )
-    sections = [one for one in (ramp.main if role == "host" else ramp.ramp + ramp.main) if one.edge == edge]
+    sections = [one for one in (ramp.main if path == "main" else ramp.ramp + ramp.main) if one.edge == edge]
     lanes = {str(one.lane) for one in sections}
     if _is_number(car.lane) and car.lane not in lanes:
         raise UserError(
-            f"{car.where}: departLane is {car.lane}; on '{edge}' the {path} is {' or '.join(sorted(lanes))}"
+            f"{car.where}: departLane is {car.lane}; on '{edge}' the {_LANES[role]} is {' or '.join(sorted(lanes))}"
         )
     length = sections[0].length
     position = car.position + length if car.position < 0.0 else car.position  # SUMO counts from the end, too

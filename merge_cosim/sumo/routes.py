@@ -8,7 +8,7 @@ from lxml import etree
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.ramps.definition import FILE_NAME
-from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.ramps.view import FILE_NAME as VIEW
 from merge_cosim.ramps.view import copy_view
 from merge_cosim.sumo.lane_map import LaneMap
@@ -17,10 +17,11 @@ from merge_cosim.sumo.vehicle_types import COLORS, CONTROLLED, MERGE_POSITION, R
 from merge_cosim.sumo.xml import element, number, write_xml
 
 
-def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) -> Path:
+def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int, host: Way = "main") -> Path:
     """Write net, ramp, routes and configuration of one encounter into a folder and return the `.sumocfg`.
 
-    Left alone, SUMO drives both cars by its own models; the initial state is the encounter's.
+    The host drives on the path `host`, the other car on the other one. Left alone, SUMO drives both cars by its own
+    models; the initial state is the encounter's.
 
     Raises:
         UserError: The encounter starts off the net.
@@ -35,8 +36,8 @@ def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int) 
     }
     types, cars = [], []
     for role, (station, speed, length) in states.items():
-        where = LaneMap(ramp).place("main" if role == "host" else "ramp", float(station[row]), merge_position)
-        route = ramp.main_route if role == "host" else ramp.ramp_route
+        path: Way = "main" if (role == "host") == (host == "main") else "ramp"
+        where, route = LaneMap(ramp).place(path, float(station[row]), merge_position), ramp.route(path)
         parameters = {ROLE: role} | ({MERGE_POSITION: number(merge_position)} if role == "merging" else {})
         kind = replace(CONTROLLED, id=role, length=float(length[row]), color=COLORS[role], parameters=parameters)
         types.append(kind.element())

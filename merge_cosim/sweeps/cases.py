@@ -7,7 +7,7 @@ import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -18,7 +18,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.core.units import DT, FloatArray, IntArray
 from merge_cosim.ngsim.pairing.recordings import LoggedScene, pair_in_scene
-from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.ramps.view import view_options
 from merge_cosim.scenarios.sources import Routes, Traffic
 from merge_cosim.scoring.rules import Rules, expected_cycles
@@ -152,10 +152,12 @@ class PairCases(Cases):
 
     Attributes:
         pairs: The encounters.
+        host: Where the hosts drive.
     """
 
     most: ClassVar[int] = CHUNK_CASES
     pairs: Encounters
+    host: Way = field(default="main", kw_only=True)
 
     @property
     def encounters(self) -> Encounters:
@@ -203,10 +205,10 @@ class PairCases(Cases):
         if human:
             yield Opened(LoggedHostWorld(len(self)), seed, no_facts)
         elif options == AS_IN_A_SWEEP:
-            yield Opened(worker_session.world(ramp, len(self), seed), seed, no_facts)
+            yield Opened(worker_session.world(ramp, len(self), seed, self.host), seed, no_facts)
         else:
             worker_session.close()
-            world = _single_world(ramp, seed, options)
+            world = _single_world(ramp, seed, options, self.host)
             try:
                 yield Opened(world, seed, no_facts)
             finally:
@@ -218,15 +220,15 @@ def no_facts(run: Run) -> Facts:
     return []
 
 
-def _single_world(ramp: Ramp, seed: int, options: RunOptions) -> TiledWorld:
+def _single_world(ramp: Ramp, seed: int, options: RunOptions, host: Way) -> TiledWorld:
     """SUMO for one encounter."""
     attach = options.attach
     if attach is not None:
-        return TiledWorld(ramp, 1, seed, lambda sumo: AttachedSession(sumo, attach), tiled=False)
+        return TiledWorld(ramp, 1, seed, lambda sumo: AttachedSession(sumo, attach), tiled=False, host=host)
     if options.gui_delay is None:
-        return TiledWorld(ramp, 1, seed, extra=options.extra)
+        return TiledWorld(ramp, 1, seed, extra=options.extra, host=host)
     shown = (*view_options(ramp.net.parent), *delay_option(options.gui_delay))
-    world = TiledWorld(ramp, 1, seed, _open_window, (*shown, *options.extra))
+    world = TiledWorld(ramp, 1, seed, _open_window, (*shown, *options.extra), host=host)
     world.session.follow(tile_id(0, "host"))
     return world
 

@@ -257,7 +257,8 @@ def _encounter_tasks(
 def _cases(scenario: Scenario, encounters: Encounters, source: str, request: SweepRequest) -> PairCases:
     """The encounters alone, or among the cars that were logged with them."""
     if scenario.full_scene is None:
-        return ClosedFormCases(encounters) if request.world == "closed-form" else PairCases(encounters)
+        kind = ClosedFormCases if request.world == "closed-form" else PairCases
+        return kind(encounters, host=scenario.host)
     if request.world == "closed-form":
         raise _needs_sumo(scenario, "full_scene")
     try:
@@ -275,12 +276,13 @@ def _needs_sumo(scenario: Scenario, why: str) -> UserError:
 def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:
     """The encounters that the ramp has room for, and the names of the others."""
     ramp = Ramp.load(scenario.ramp)
-    fits = ramp.holds(encounters.merge_position, encounters.host_station, encounters.merging_station)
+    paths = {scenario.host: encounters.host_station, scenario.other: encounters.merging_station}
+    fits = ramp.holds(encounters.merge_position, paths["main"], paths["ramp"])
     if not fits.any():
         merge_position = float(encounters.merge_position[0])
         lanes = LaneMap(ramp)
-        lanes.place("main", float(encounters.host_station[0]), merge_position)
-        lanes.place("ramp", float(encounters.merging_station[0]), merge_position)
+        for path, station in paths.items():
+            lanes.place(path, float(station[0]), merge_position)
     return _taken(encounters, np.flatnonzero(fits)), tuple(encounters.case[~fits].tolist())
 
 

@@ -113,7 +113,7 @@ def export_case(request: SweepRequest, case: str, out: Path) -> Path:
     if not isinstance(task.cases, TrafficCases):
         task = case_alone(tasks, case)
         assert task.cases.encounters is not None
-        return write_encounter(out, task.ramp, task.cases.encounters, 0)
+        return write_encounter(out, task.ramp, task.cases.encounters, 0, task.scenario.host)
     traffic = task.cases.traffic
     if not isinstance(traffic, Traffic):
         raise UserError(f"{traffic.file}: this is a SUMO configuration already")
@@ -141,4 +141,4 @@ def export_commonroad(request: SweepRequest, case: str, out: Path) -> Path:
     _, record = trace_case(task, case)
     source = encounters.source[0]
     story = f"scenario {task.scenario.name} (source {source}), case {case}, host driven by {task.method.name}"
-    return write_commonroad(out, task.ramp, encounters, record, number, story)
+    return write_commonroad(out, task.ramp, encounters, record, number, story, task.scenario.host)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.simulation.worlds.tiles import TiledWorld
 
 TILES = 192
@@ -11,20 +11,23 @@ cycle's Python over more cars, but SUMO's own step costs more per car, as more c
 
 
 class WorkerSession:
-    """Keeps one tiled world open, as long as ramp and seed stay the same; libsumo holds one simulation per process."""
+    """Keeps one tiled world open, as long as ramp, seed and the hosts' path stay the same.
+
+    libsumo holds one simulation per process.
+    """
 
     def __init__(self, tiles: int = TILES) -> None:
         self._tiles = tiles
-        self._open: tuple[str, int, int] | None = None
+        self._open: tuple[str, int, int, Way] | None = None
         self._world: TiledWorld | None = None
 
-    def world(self, ramp: Ramp, cases: int, seed: int) -> TiledWorld:
+    def world(self, ramp: Ramp, cases: int, seed: int, host: Way = "main") -> TiledWorld:
         """A world on this ramp, with no more tiles than there are cases."""
         tiles = min(self._tiles, cases)
-        wanted = (str(ramp.net), tiles, seed)
+        wanted = (str(ramp.net), tiles, seed, host)
         if self._world is None or self._open != wanted:
             self.close()
-            self._world, self._open = TiledWorld(ramp, tiles, seed), wanted
+            self._world, self._open = TiledWorld(ramp, tiles, seed, host=host), wanted
         return self._world
 
     def close(self) -> None:

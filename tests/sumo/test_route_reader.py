@@ -38,12 +38,13 @@ def write(folder, routes=ROUTES, config=CONFIG):
     return file
 
 
-def test_what_was_written_is_read_again(tmp_path):
+@pytest.mark.parametrize("host", ["main", "ramp"])
+def test_what_was_written_is_read_again(tmp_path, host):
     ramp = Ramp.load("us101")
     text, none = np.array(["one"]), np.zeros(1, dtype=bool)
     numbers = (np.array([value]) for value in (-95.0, 21.5, 4.5, -12.0, 17.25, 6.0, 33.0))
     original = Encounters(text, text, text, text, *numbers, np.array([-1]), none, none)
-    _, again = read_sumocfg(write_encounter(tmp_path / "case", ramp, original, 0))
+    _, again = read_sumocfg(write_encounter(tmp_path / "case", ramp, original, 0, host), host)
     for name in ("host_station", "host_speed", "host_length", "merging_station", "merging_speed", "merging_length"):
         np.testing.assert_allclose(getattr(again, name), getattr(original, name), atol=1e-9, err_msg=name)
     assert again.merge_position[0] == 33.0

@@ -23,7 +23,7 @@ from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.stored import read_pairs, write_pairs
 from merge_cosim.ngsim.sites import Site
 
-PAIRS_VERSION = 1
+PAIRS_VERSION = 2
 """Raised when the same trajectories would be paired differently, so that cached pairs are made anew."""
 
 COMPLETE_CARS = 1_000

@@ -183,6 +183,9 @@ def _encounters(
                 np.where(m_leaves < tracks.offsets[merging + 1], m_leaves - m_start - 1, NEVER),
                 np.where(h_leaves < tracks.offsets[host + 1], h_leaves - h_start - 1, NEVER),
             ),
+            host_speed=Ragged.of(
+                [_observed(tracks, t, a, b, rules) for t, a, b in zip(host, h_start, h_end, strict=True)]
+            ),
         ),
     )
 
@@ -202,7 +205,7 @@ def _credible_end(tracks: Tracks, track: IntArray, change: IntArray, rules: Pair
 
 
 def _observed(tracks: Tracks, track: int, start: int, end: int, rules: PairRules) -> FloatArray:
-    """Speed [m/s] of a merging car as observed in rows `start` to `end`; the filter uses earlier rows as well."""
+    """Speed [m/s] of a car as observed in rows `start` to `end`; the filter uses earlier rows as well."""
     first = tracks.offsets[track]
     speed = tracks.speed[first:end]
     if rules.observed == "causal":

@@ -13,7 +13,7 @@ from merge_cosim.ngsim.pairing.pairs import Paired
 
 _FACTS = b"merge_cosim"
 _COLUMNS = tuple(field.name for field in fields(Encounters) if field.name != "log")
-_TRACKS = ("merging_station", "merging_speed", "host_station")
+_TRACKS = ("merging_station", "merging_speed", "host_station", "host_speed")
 _CYCLES = ("change_cycle", "score_until")
 
 
@@ -45,6 +45,7 @@ def read_pairs(path: Path) -> Paired:
         host_station=tracks["host_station"],
         change_cycle=cycles["change_cycle"],
         score_until=cycles["score_until"],
+        host_speed=tracks["host_speed"],
     )
     return Paired(
         Encounters(**{name: table[name].to_numpy() for name in _COLUMNS}, log=log),

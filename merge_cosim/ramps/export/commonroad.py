@@ -48,8 +48,11 @@ def need_library() -> None:
         raise UserError("--commonroad needs commonroad-io: pip install 'merge-cosim[commonroad]'") from None
 
 
+Car = Literal["host", "merging"]
+
+
 def write_commonroad(
-    folder: Path, ramp: Ramp, encounters: Encounters, record: pd.DataFrame, number: int, story: str
+    folder: Path, ramp: Ramp, encounters: Encounters, record: pd.DataFrame, number: int, story: str, host: Way = "main"
 ) -> Path:
     """Write a scenario file, named by its benchmark id, into a folder.
 
@@ -60,6 +63,7 @@ def write_commonroad(
         record: Its record, one row per cycle.
         number: Number of the case in its scenario from 1 on, the configuration in the benchmark id.
         story: Where the case comes from, the file's attribute `source`.
+        host: The host's path; the other car is on the other one.
     """
     from commonroad.common.file_writer import CommonRoadFileWriter
     from commonroad.common.util import FileFormat
@@ -71,8 +75,13 @@ def write_commonroad(
     name, ids = _benchmark_id(ramp, number), count(1)
     scenario = Scenario(DT, name)
     scenario.add_objects(_network(road, ramp, ids))
-    scenario.add_objects(_merging_car(next(ids), road, ramp, encounters, record))
-    problem = _host(next(ids), road, ramp, encounters, record)
+    paths: dict[Car, Way] = {"host": host, "merging": "ramp" if host == "main" else "main"}
+
+    def states(car: Car) -> list[dict[str, Any]]:
+        return _states(car, paths[car], road, ramp, encounters, record)
+
+    scenario.add_objects(_merging_car(next(ids), states("merging"), float(encounters.merging_length[0])))
+    problem = _host(next(ids), states("host"), road, ramp, float(encounters.merge_position[0]))
     tags = [Tag.HIGHWAY, Tag.MERGING_LANES, Tag.SPEED_LIMIT]
     tags += [Tag.LANE_CHANGE] if ramp.changes_lane else []
     tags += [Tag.SIMULATED] if encounters.log is None else []
@@ -170,17 +179,14 @@ def _limit_sign(number: int, limit: float, first: set[int], position: FloatArray
     return TrafficSign(number, [TrafficSignElement(signs.MAX_SPEED, [str(limit)])], first, position, virtual=True)
 
 
-def _merging_car(
-    number: int, road: Mapping[str, Lanelet], ramp: Ramp, encounters: Encounters, record: pd.DataFrame
-) -> DynamicObstacle:
+def _merging_car(number: int, states: list[dict[str, Any]], length: float) -> DynamicObstacle:
     from commonroad.geometry.obstacle_shapes.rect_obstacle_shape import RectObstacleShape
     from commonroad.prediction.prediction import TrajectoryPrediction
     from commonroad.scenario.obstacle import DynamicObstacle, ObstacleType
     from commonroad.scenario.state import ExtendedPMState
     from commonroad.scenario.trajectory import Trajectory
 
-    shape = RectObstacleShape(CAR_WIDTH, float(encounters.merging_length[0]))
-    states = _states("merging", road, ramp, encounters, record)
+    shape = RectObstacleShape(CAR_WIDTH, length)
     trajectory = Trajectory(1, [ExtendedPMState(step, **state) for step, state in enumerate(states[1:], 1)])
     return DynamicObstacle(
         number, ObstacleType.CAR, shape, _initial(states[0]), TrajectoryPrediction(trajectory, shape)
@@ -188,7 +194,7 @@ def _merging_car(
 
 
 def _host(
-    number: int, road: Mapping[str, Lanelet], ramp: Ramp, encounters: Encounters, record: pd.DataFrame
+    number: int, states: list[dict[str, Any]], road: Mapping[str, Lanelet], ramp: Ramp, merge_position: float
 ) -> PlanningProblem:
     """The host's start; its goal is to be past the merging point, on its lane, by the end of the record."""
     import shapely
@@ -198,19 +204,19 @@ def _host(
     from commonroad.planning.planning_problem import PlanningProblem
     from commonroad.scenario.state import CustomState
 
-    merge_position = float(encounters.merge_position[0])
     goals = []
     for section in ramp.main:
         if section.end > merge_position:
             area = road[f"{section.edge}_{section.lane}"].area_from(max(merge_position - section.start, 0.0))
             place = PolygonOccupancy(shapely.Polygon(area))
-            goals.append(CustomState(time_step=Interval(0, len(record) - 1), position=place))
-    start = _states("host", road, ramp, encounters, record)[0] | {"acceleration": 0.0}  # the method's is no part of it
+            goals.append(CustomState(time_step=Interval(0, len(states) - 1), position=place))
+    start = states[0] | {"acceleration": 0.0}  # the method's is no part of it
     return PlanningProblem(number, _initial(start), GoalRegion(goals))
 
 
 def _states(
-    car: Literal["host", "merging"],
+    car: Car,
+    path: Way,
     road: Mapping[str, Lanelet],
     ramp: Ramp,
     encounters: Encounters,
@@ -219,7 +225,6 @@ def _states(
     """A car's states in CommonRoad's terms, one per cycle; the acceleration is the one to the next cycle."""
     station, speed = (record[f"{car}_{name}"].to_numpy() for name in ("station_m", "speed_m_s"))
     length = encounters.host_length if car == "host" else encounters.merging_length
-    path: Way = "main" if car == "host" else "ramp"
     place, heading = poses(road, ramp, path, station, float(length[0]), float(encounters.merge_position[0]))
     acceleration = np.append(np.diff(speed) / DT, 0.0)
     return [

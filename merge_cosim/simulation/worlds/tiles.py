@@ -38,6 +38,7 @@ class TiledWorld(GivenWorld):
         open_session: Callable[[SumoOptions], Session] = LibsumoSession,
         extra: tuple[str, ...] = (),
         tiled: bool = True,
+        host: Way = "main",
     ) -> None:
         """Open a session and add the cars.
 
@@ -48,6 +49,7 @@ class TiledWorld(GivenWorld):
             open_session: What opens SUMO.
             extra: Further options of SUMO.
             tiled: The session's net has tiles, not the ramp's own edges, which hold one encounter at a time.
+            host: Where the hosts drive; the merging cars drive on the other path.
         """
         super().__init__(slots)
         self.ramp = ramp
@@ -57,12 +59,14 @@ class TiledWorld(GivenWorld):
         self.session = open_session(SumoOptions(net, seed=seed, extra=extra))
         self._names = [self._id(tile, car) for car in ("host", "merging") for tile in range(slots)]
         self._row = {name: row for row, name in enumerate(self._names)}
-        routes = (ramp.main_route, ramp.ramp_route)
+        self._paths: tuple[Way, Way] = ("main", "ramp") if host == "main" else ("ramp", "main")
+        self._by_ramp = self._paths.index("ramp")
+        routes = [ramp.route(path) for path in self._paths]
         self.session.add(
             Car(name, tuple(self._id(row % slots, edge) for edge in routes[row // slots]), COLORS[row // slots])
             for name, row in self._row.items()
         )
-        self._lanes, self._along = LaneMap(ramp), AlongPaths(ramp, slots)
+        self._lanes, self._along = LaneMap(ramp), AlongPaths(ramp, slots, self._paths)
         self._merge_position = np.zeros(2 * slots)
         self._length = np.full(2 * slots, np.nan)
         self._in_host_lane = np.ones(slots, dtype=bool)
@@ -75,8 +79,8 @@ class TiledWorld(GivenWorld):
         self.state[:, slots] = self._closed_form.state[:, slots] = start[:4]
         self._in_host_lane[slots] = not self.ramp.changes_lane
         merge_position = self.encounters.merge_position[cases]
-        paths: tuple[tuple[Way, IntArray], ...] = (("main", slots), ("ramp", slots + self.slots))
-        for car, (path, rows) in enumerate(paths):
+        for car, path in enumerate(self._paths):
+            rows = slots + car * self.slots
             self._merge_position[rows] = merge_position
             values = zip(rows.tolist(), merge_position.tolist(), *start[car::2].tolist(), strict=True)
             for row, position, station, speed, length in values:
@@ -92,9 +96,9 @@ class TiledWorld(GivenWorld):
             self._length[row] = length
 
     def command(self, speeds: FloatArray) -> None:
-        """See `World`; a merging car whose front reaches the merging point in this cycle changes lane in it."""
+        """See `World`; a car from the ramp whose front reaches the merging point in this cycle changes lane in it."""
         if self.ramp.changes_lane:
-            self._change_lanes(self.state[1] + speeds[1] * DT)
+            self._change_lanes(self.state[self._by_ramp] + speeds[self._by_ramp] * DT)
         self._closed_form.move(speeds)
         self.session.command(self._names, speeds.ravel().tolist())
 
@@ -121,11 +125,11 @@ class TiledWorld(GivenWorld):
         self.session.close()
 
     def _change_lanes(self, reached: FloatArray) -> None:
-        """Command the lane changes of this cycle; `reached` are the merging cars' stations at its end [m]."""
+        """Command the lane changes of this cycle; `reached`: stations of the cars from the ramp at its end [m]."""
         arrives = ~self._in_host_lane & (reached >= -TOLERANCE)
         for tile in np.flatnonzero(arrives).tolist():
             edge = self._lanes.place("main", max(float(reached[tile]), 0.0), float(self._merge_position[tile])).edge
-            self.session.change_lane(self._names[tile + self.slots], self._lanes.host_lane(edge))
+            self.session.change_lane(self._names[tile + self._by_ramp * self.slots], self._lanes.host_lane(edge))
         self._in_host_lane |= arrives
 
     def _read(self) -> None:
