@@ -60,7 +60,12 @@ class Chapter:
     @property
     def has_interval(self) -> bool:
         """The cases are a sample, so that rates have intervals."""
-        return any(row["failed_low"] is not None for row in self.rows)
+        return any(row["failed_low"] is not None for row in self.rows if row["models"] == 1)
+
+    @property
+    def has_models(self) -> bool:
+        """At least one method was run with several models."""
+        return any(row["models"] > 1 for row in self.rows)
 
     @property
     def has_stuck(self) -> bool:

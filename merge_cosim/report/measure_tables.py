@@ -6,13 +6,14 @@ import pandas as pd
 
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order
-from merge_cosim.report.tables import METHOD, Section, of_section, ranges
+from merge_cosim.report.tables import METHOD, MODEL, Section, of_section, ranges, with_models
 from merge_cosim.results.statistics import belief
 from merge_cosim.results.statistics.summary import ALL_STARTS
 from merge_cosim.scenarios.methods import is_reference
 
 SAFETY = (
     METHOD,
+    MODEL,
     Column("cluster_pct", "failures % by car", None, "95 % intervals, bootstrap"),
     Column("distance_interval_m", "D m", None, "95 % intervals, bootstrap"),
     Column("min_ttc_s_p05", "TTC 5 % s", 2, "surrogate safety"),
@@ -44,7 +45,7 @@ BELIEF = (
 
 def safety_table(summary: pd.DataFrame, section: Section) -> Table:
     """Surrogate safety, comfort, difference to the logged host, and failures of pairs of methods on the same cases."""
-    rows = of_section(summary, section).copy()
+    rows = with_models(of_section(summary, section))
     rows["cluster_pct"] = ranges(rows["cluster_low_pct"], rows["cluster_high_pct"])
     rows["labelled"] = rows["labelled"].where(rows["labelled"] > 0)
     rows["distance_interval_m"] = ranges(rows["distance_low_m"], rows["distance_high_m"])

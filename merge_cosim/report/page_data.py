@@ -18,6 +18,7 @@ from merge_cosim.scenarios.methods import is_reference
 
 MOST_DOTS = 1_500
 """Cases of a sample whose delays are drawn; of more, every k-th and all that failed."""
+MEASURED = ["failures", "stuck", "failure_pct", "failed_or_stuck_pct", "delay_s", "distance_m"]
 CALIBRATED_AT = 40
 """Distance of the merging car [m] at which calibration is drawn."""
 
@@ -33,46 +34,53 @@ def method_looks(looks: Mapping[str, Look]) -> dict[str, Any]:
 def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, said: Verdict) -> list[dict[str, Any]]:
     """One entry per method, the best first and references last: the numbers of the chart and of the short table.
 
+    Of a method with several models the median, and the range in place of the intervals.
+
     Args:
         summary: Summary rows of one section.
         rows: Its result rows.
         said: Its verdict.
     """
-    order = {method: place for place, method in enumerate(said.order)}
     found = []
-    for row in summary.to_dict("records"):
-        method = str(row["method"])
-        own = rows[rows["method"] == method]
-        low, high = _delay_interval(own)
+    for method in in_order(map(str, summary["method"])):
+        own = summary[summary["method"] == method]
+        middle = own[MEASURED].apply(pd.to_numeric).median()
+        bad_low, bad_high = own["failed_or_stuck_low_pct"].iloc[0], own["failed_or_stuck_high_pct"].iloc[0]
+        failed_low, failed_high = own["ci_low_pct"].iloc[0], own["ci_high_pct"].iloc[0]
+        delay_low, delay_high = _delay_interval(rows[rows["method"] == method])
+        if len(own) > 1:  # the range over models in place of the interval over cases
+            bad_low, bad_high = own["failed_or_stuck_pct"].min(), own["failed_or_stuck_pct"].max()
+            failed_low, failed_high = own["failure_pct"].min(), own["failure_pct"].max()
+            delay_low, delay_high = own["delay_s"].min(), own["delay_s"].max()
         found.append(
             {
                 "method": method,
                 "reference": is_reference(method),
                 "best": method in said.best and len(said.order) > 1,
                 "undecided": method in said.undecided and method not in said.best,
-                "n": int(row["n"]),
-                "failed": int(row["failures"]),
-                "stuck": int(row["stuck"]),
-                "failed_pct": number(row["failure_pct"]),
-                "failed_low": number(row["ci_low_pct"]),
-                "failed_high": number(row["ci_high_pct"]),
-                "bad_pct": number(row["failed_or_stuck_pct"]),
-                "bad_low": number(row["failed_or_stuck_low_pct"]),
-                "bad_high": number(row["failed_or_stuck_high_pct"]),
-                "delay": number(row["delay_s"], 6),
-                "delay_low": number(low, 6),
-                "delay_high": number(high, 6),
-                "distance": number(row["distance_m"], 6),
+                "models": len(own),
+                "n": int(own["n"].iloc[0]),
+                "failed": round(middle["failures"]),
+                "stuck": round(middle["stuck"]),
+                "failed_pct": number(middle["failure_pct"]),
+                "failed_low": number(failed_low),
+                "failed_high": number(failed_high),
+                "bad_pct": number(middle["failed_or_stuck_pct"]),
+                "bad_low": number(bad_low),
+                "bad_high": number(bad_high),
+                "delay": number(middle["delay_s"], 6),
+                "delay_low": number(delay_low, 6),
+                "delay_high": number(delay_high, 6),
+                "distance": number(middle["distance_m"], 6),
             }
         )
-    worst = len(order)
+    order = {method: place for place, method in enumerate(said.order)}
     return sorted(
         found,
         key=lambda one: (
             one["reference"],
-            order.get(one["method"], worst),
+            order.get(one["method"], len(order)),
             math.inf if one["bad_pct"] is None else one["bad_pct"],
-            one["method"],
         ),
     )
 

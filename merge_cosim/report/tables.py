@@ -17,8 +17,10 @@ from merge_cosim.results.statistics.summary import ALL_SITES, AMBIGUITY_EDGES, b
 from merge_cosim.scenarios.methods import HUMAN, ORACLE_BEST, is_reference
 
 METHOD = Column("method", "method")
+MODEL = Column("model", "model")
 MAIN = (
     METHOD,
+    MODEL,
     Column("n", "n", 0, "failures"),
     Column("failures", "count", 0, "failures"),
     Column("failure_pct", "%", 2, "failures"),
@@ -94,7 +96,7 @@ def sections(summary: pd.DataFrame) -> list[Section]:
 
 def main_table(summary: pd.DataFrame, section: Section) -> Table:
     """Every measure per method, ours beside the published figures."""
-    rows = of_section(summary, section)
+    rows = with_models(of_section(summary, section))
     return Table.of(rows, MAIN, list(map(is_reference, rows["method"])), "Outcome by method")
 
 
@@ -131,7 +133,7 @@ def variation_table(summary: pd.DataFrame, scenario: str, parameter: str) -> Tab
     base = rows[(rows["variation"] == "") & rows["method"].isin(varied["method"])].assign(value="as it stands")
     rows = pd.concat([base, varied])
     rows = rows.sort_values(["source", "site", "order", "place"], kind="stable")
-    columns = [METHOD, Column("value", parameter), *(column for column in MAIN[1:] if column.group not in NOT_VARIED)]
+    columns = [METHOD, Column("value", parameter), *(column for column in MAIN[2:] if column.group not in NOT_VARIED)]
     many = [name for name in ("site", "source") if rows[name].nunique() > 1]
     columns[1:1] = [Column(name, name) for name in many]
     return Table.of(rows, columns, list(map(is_reference, rows["method"])), f"{scenario}: {parameter} varied")
@@ -158,6 +160,12 @@ def of_section(summary: pd.DataFrame, section: Section) -> pd.DataFrame:
     rows = summary[summary["variation"] == ""]
     same = (rows["scenario"] == section.scenario) & (rows["site"] == section.site) & (rows["source"] == section.source)
     return rows[same]
+
+
+def with_models(rows: pd.DataFrame) -> pd.DataFrame:
+    """Summary rows whose models are named only where a method has several of them."""
+    several = rows["method"].duplicated().any()
+    return rows.assign(model=rows["model"].replace("", None) if several else None)
 
 
 def ranges(low: pd.Series, high: pd.Series) -> list[str | None]:

@@ -36,7 +36,9 @@ def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> tuple[list[di
     """
     if traces.empty:
         return [], 0
-    rows = results[results["variation"] == ""].drop_duplicates(["scenario", "case", "method"])
+    rows = results[results["variation"] == ""].drop_duplicates(
+        ["scenario", "case", "method"]
+    )  # of several models the first
     rows = rows.set_index(["scenario", "case", "method"]).sort_index()
     found: list[dict[str, Any]] = []
     cycles = left_out = 0
@@ -64,6 +66,8 @@ def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> tuple[list[di
 
 
 def _run(records: pd.DataFrame, method: str) -> dict[str, Any]:
+    again = np.flatnonzero(np.diff(records["time_s"]) <= 0)  # the same method with another model
+    records = records.iloc[: again[0] + 1] if len(again) else records
     odds = records["log_odds"].to_numpy(dtype=float)
     columns = records.assign(belief=0.5 + 0.5 * np.tanh(0.5 * odds))
     series = {name: differences(columns[column], decimals) for name, (column, decimals) in QUANTITIES.items()}

@@ -9,6 +9,7 @@ import pandas as pd
 import pyarrow as pa
 
 from merge_cosim.results.store import ResultFolder
+from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.task import Task
 from merge_cosim.sweeps.worker_session import WorkerSession
@@ -38,7 +39,7 @@ def time_single_cases(tasks: Sequence[Task], results: ResultFolder) -> tuple[dic
         scenario = task.scenario.name
         if scenario not in illustrative:
             illustrative[scenario] = _illustrative_case(
-                results.rows_of(scenario, "", ["case", "failed", "distance_m"]).to_pandas()
+                results.rows_of(scenario, "", ["case", "method", "failed", "distance_m"]).to_pandas()
             )
         order = np.argsort(task.cases.encounters.case != illustrative[scenario], kind="stable")[:SINGLE_CASES]
         name = str(task.cases.encounters.case[order[0]])
@@ -51,8 +52,12 @@ def time_single_cases(tasks: Sequence[Task], results: ResultFolder) -> tuple[dic
 
 
 def _illustrative_case(rows: pd.DataFrame) -> str:
-    """The case on which the methods differ most: in failing, then in where they are when the host arrives."""
-    by_case = rows.groupby("case")
+    """The case on which the methods differ most: in failing, then in where they are when the host arrives.
+
+    References do not count, unless there is nothing else.
+    """
+    methods = rows[~rows["method"].map(is_reference)]
+    by_case = (methods if len(methods) else rows).groupby("case")
     failing = by_case["failed"].mean()
     spread = by_case["distance_m"].max() - by_case["distance_m"].min()
     order = pd.DataFrame({"split": failing * (1 - failing), "spread": spread.fillna(0.0)})

@@ -18,7 +18,8 @@ def _summary(source="designed", /, **methods):
 
 def _rows(source, /, **failing):
     """Result rows of 40 cases; by method the numbers of the cases that failed."""
-    same = {"scenario": "s", "variation": "", "site": "x", "source": source, "censored": False, "stuck": False}
+    same = {"scenario": "s", "variation": "", "site": "x", "source": source, "model": ""}
+    same |= {"censored": False, "stuck": False}
     return pd.DataFrame(
         [same | {"method": m, "case": f"{i}", "failed": i in bad} for m, bad in failing.items() for i in range(40)]
     )
@@ -93,7 +94,8 @@ def test_without_common_cases_by_fishers_test():
     found = verdict(summary, _rows("traffic", a=[], b=[], c=[]))
     assert found.undecided == ()
     assert found.sentence.endswith(
-        "b 6 of 30 (20.0 %); c 21 of 31 (67.7 %). Every difference from a is beyond chance (p < 0.05, Holm)."
+        "b 6 of 30 (20.0 %); c 21 of 31 (67.7 %). "
+        "Every difference of a from the others is beyond chance (p < 0.05, Holm)."
     )
     assert verdict(summary.assign(failures=[0, 5, 6])).undecided == ("b",)
 
@@ -116,3 +118,28 @@ def test_one_verdict_for_each_site_and_the_rows_of_all_sites_together():
     found = verdicts(pd.concat([at("x"), at("y"), at("all")]).assign(), both)
     assert list(found) == [("s", "x", "random"), ("s", "y", "random"), ("s", "all", "random")]
     assert all(one.undecided == () for one in found.values())
+
+
+def _models(source, /, **shares):
+    """Summary rows of methods with several models of 40 cases, from the failures under each; and their rows."""
+    same = {"scenario": "s", "variation": "", "site": "x", "source": source, "n": 40, "stuck": 0, "delay_s": 1.0}
+    key = {"scenario": "s", "variation": "", "site": "x", "source": source, "censored": False, "stuck": False}
+    runs = [(method, f"m{i}", bad) for method, found in shares.items() for i, bad in enumerate(found)]
+    rows = [key | {"method": m, "model": k, "case": f"{i}", "failed": i < bad} for m, k, bad in runs for i in range(40)]
+    return pd.DataFrame([same | {"method": m, "model": k, "failures": bad} for m, k, bad in runs]), pd.DataFrame(rows)
+
+
+def test_a_method_with_several_models_is_judged_by_its_median_model():
+    found = verdict(*_models("designed", a=[0, 2, 1], b=[30, 20, 10], c=[3, 1, 4]))
+    assert found.order == ("a", "c", "b")
+    assert found.undecided == ("c",)  # better than a with the second model
+    assert found.sentence == (
+        "a fails least: median 2.5 %, 0.0–5.0 % over 3 models of 40 cases; c median 7.5 %, 2.5–10.0 % over 3 models; "
+        "b median 50.0 %, 25.0–75.0 % over 3 models. Which of a and c is better depends on the trained model."
+    )
+
+
+def test_of_a_sample_every_model_must_be_beyond_chance():
+    decided = verdict(*_models("random", a=[0, 0], b=[8, 9]))
+    assert decided.undecided == ()
+    assert verdict(*_models("random", a=[0, 0], b=[8, 4])).undecided == ("b",)  # 4 of 4: p = 0.125

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,10 @@ class Verdict:
     Attributes:
         sentence: One or two sentences in plain text.
         order: Methods without the references: the smallest share of failed or stuck cases first, ties by mean delay.
+            A method that was run with several models is judged by its median model.
         best: Those of them with the smallest share.
-        undecided: Methods whose difference from the first is undecided; empty on a fixed grid, which is no sample.
+        undecided: Methods whose difference from the first is undecided: by chance, or because it depends on the
+            trained model. A fixed grid is no sample, so there chance does not count.
     """
 
     sentence: str
@@ -40,11 +43,14 @@ class Verdict:
 
 @dataclass(frozen=True)
 class _Count:
+    """What became of one method's cases; of a method with several models, one entry each."""
+
     method: str
     n: int
     failed: int
     stuck: int
     delay: float
+    model: str = ""
 
     @property
     def bad(self) -> int:
@@ -54,9 +60,37 @@ class _Count:
     def share(self) -> float:
         return self.bad / self.n
 
+
+@dataclass(frozen=True)
+class _Standing:
+    """A method by its median model."""
+
+    counts: tuple[_Count, ...]
+
+    @property
+    def method(self) -> str:
+        return self.counts[0].method
+
+    @property
+    def share(self) -> float:
+        return median(one.share for one in self.counts)
+
+    @property
+    def delay(self) -> float:
+        return median(one.delay for one in self.counts)
+
     @property
     def percent(self) -> str:
-        return percent(100 * self.share)
+        if len(self.counts) == 1:
+            return percent(100 * self.share)
+        low, high = (100 * pick(one.share for one in self.counts) for pick in (min, max))
+        return f"median {percent(100 * self.share)}, {low:.1f}–{high:.1f} % over {len(self.counts)} models"
+
+    def number(self, with_n: bool) -> str:
+        one = self.counts[0]
+        if len(self.counts) > 1:
+            return self.percent
+        return f"{one.bad:,}{f' of {one.n:,}' if with_n else ''} ({self.percent})"
 
 
 def verdict(summary: pd.DataFrame | Sequence[dict[str, Any]], rows: pd.DataFrame | None = None) -> Verdict:
@@ -73,17 +107,20 @@ def verdict(summary: pd.DataFrame | Sequence[dict[str, Any]], rows: pd.DataFrame
     frame = frame[~frame["method"].map(is_reference)] if len(frame) else frame
     if frame.empty:
         return Verdict("Only references were run: there is no method to judge.")
-    scored = frame[frame["n"] > 0]
-    counts = [_count(str(method), part) for method, part in scored.groupby("method")]
-    counts.sort(key=lambda one: (one.share, one.delay, one.method))
-    if not counts:
+    found: dict[str, list[_Count]] = {}
+    for row in frame[frame["n"] > 0].to_dict("records"):
+        found.setdefault(str(row["method"]), []).append(_count(row))
+    standings = sorted(
+        (_Standing(tuple(v)) for v in found.values()), key=lambda one: (one.share, one.delay, one.method)
+    )
+    if not standings:
         return Verdict("No case could be scored to the end: there is nothing to judge.")
     sample = is_sample(frame)
     paired = rows if rows is not None and (frame["source"] != TRAFFIC).all() else None
-    open_ = _undecided(counts, paired) if sample else ()
-    order = tuple(one.method for one in counts)
-    best = tuple(one.method for one in counts if one.share == counts[0].share)
-    return Verdict(_sentence(counts, len(best), open_, sample), order, best, open_)
+    open_ = _undecided(standings, paired, sample)
+    order = tuple(one.method for one in standings)
+    best = tuple(one.method for one in standings if one.share == standings[0].share)
+    return Verdict(_sentence(standings, len(best), open_, sample), order, best, open_)
 
 
 def verdicts(summary: pd.DataFrame, rows: pd.DataFrame | None = None) -> dict[tuple[str, str, str], Verdict]:
@@ -113,76 +150,92 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return corrected
 
 
-def _count(method: str, rows: pd.DataFrame) -> _Count:
-    known = rows.dropna(subset=["delay_s"])
-    delay = float((known["delay_s"] * known["n"]).sum() / known["n"].sum()) if len(known) else math.inf
-    n, failed, stuck = (int(rows[name].sum()) for name in ("n", "failures", "stuck"))
-    return _Count(method, n, failed, stuck, delay)
+def _count(row: Mapping[Hashable, Any]) -> _Count:
+    delay = math.inf if pd.isna(row["delay_s"]) else float(row["delay_s"])
+    return _Count(
+        str(row["method"]), int(row["n"]), int(row["failures"]), int(row["stuck"]), delay, str(row.get("model", ""))
+    )
 
 
-def _undecided(counts: Sequence[_Count], rows: pd.DataFrame | None) -> tuple[str, ...]:
-    first, others = counts[0], counts[1:]
-    values = [_p_value(first, other) if rows is None else _paired_p_value(first, other, rows) for other in others]
+def _undecided(standings: Sequence[_Standing], rows: pd.DataFrame | None, sample: bool) -> tuple[str, ...]:
+    first, others = standings[0], standings[1:]
+    if not sample and all(len(one.counts) == 1 for one in standings):
+        return ()
+    values = [_p_value(first, other, rows, sample) for other in others]
     return tuple(other.method for other, p in zip(others, holm(values), strict=True) if p >= LEVEL)
 
 
-def _p_value(one: _Count, other: _Count) -> float:
+def _p_value(first: _Standing, other: _Standing, rows: pd.DataFrame | None, sample: bool) -> float:
+    """The largest p value over common models; 1 where models disagree on which method is better; 0 on a grid."""
+    pairs = [(a, b) for a in first.counts for b in other.counts if a.model == b.model or not (a.model and b.model)]
+    signs = {bool(a.share < b.share) for a, b in pairs if a.share != b.share}
+    if len(pairs) > 1 and len(signs) != 1:
+        return 1.0
+    if not sample:
+        return 0.0
+    return max((_fisher(a, b) if rows is None else _paired(a, b, rows) for a, b in pairs), default=1.0)
+
+
+def _fisher(one: _Count, other: _Count) -> float:
     from scipy.stats import fisher_exact
 
     return float(fisher_exact(np.array([[one.bad, one.n - one.bad], [other.bad, other.n - other.bad]])).pvalue)
 
 
-def _paired_p_value(one: _Count, other: _Count, rows: pd.DataFrame) -> float:
+def _paired(one: _Count, other: _Count, rows: pd.DataFrame) -> float:
     scored = rows[~rows["censored"]]
-    bad = {m: part.set_index("case") for m, part in scored.groupby("method") if m in (one.method, other.method)}
-    both = bad[one.method].merge(bad[other.method], on="case", suffixes=("", "_other"))
-    this, that = both["failed"] | both["stuck"], both["failed_other"] | both["stuck_other"]
-    return mcnemar(int((this & ~that).sum()), int((~this & that).sum()))
+    this, that = (scored[(scored["method"] == who.method) & (scored["model"] == who.model)] for who in (one, other))
+    both = this.merge(that, on="case", suffixes=("", "_other"))
+    bad, bad_other = both["failed"] | both["stuck"], both["failed_other"] | both["stuck_other"]
+    return mcnemar(int((bad & ~bad_other).sum()), int((~bad & bad_other).sum()))
 
 
-def _sentence(counts: Sequence[_Count], tied: int, undecided: Sequence[str], sample: bool) -> str:
-    first, names = counts[0], [one.method for one in counts]
-    stuck = any(one.stuck for one in counts)
+def _sentence(standings: Sequence[_Standing], tied: int, undecided: Sequence[str], sample: bool) -> str:
+    names = [one.method for one in standings]
+    one = standings[0].counts[0]
+    stuck = any(count.stuck for standing in standings for count in standing.counts)
     what = "failed or stuck" if stuck else "failed"
-    same_n = len({one.n for one in counts}) == 1
-    if len(counts) == 1:
-        parts = f"; {first.failed:,} failed, {first.stuck:,} stuck" if stuck else ""
-        return f"{_of(first, what)} ({first.percent}){parts}. No other method to compare with."
-    if tied == len(counts):
-        share = f" ({first.percent})" if first.bad else ""
-        number = f"each {first.bad:,} of {first.n:,} cases {what}{share}" if same_n else f"{first.percent} {what}"
-        return f"No difference between {_listed(names)}: {number}."
+    same_n = len({count.n for standing in standings for count in standing.counts}) == 1
+    several = any(len(standing.counts) > 1 for standing in standings)
+    zero = not standings[0].share and len(standings[0].counts) == 1
+    if len(standings) == 1:
+        if several:
+            return f"{names[0]}: {standings[0].percent} of {one.n:,} cases {what}. No other method to compare with."
+        parts = f"; {one.failed:,} failed, {one.stuck:,} stuck" if stuck else ""
+        share = standings[0].percent
+        return f"{names[0]}: {one.bad:,} of {one.n:,} cases {what} ({share}){parts}. No other method to compare with."
+    if tied == len(standings):
+        share = "" if zero else f" ({standings[0].percent})"
+        number = f"each {one.bad:,} of {one.n:,} cases {what}{share}" if same_n and not several else ""
+        return f"No difference between {_listed(names)}: {number or f'{standings[0].percent} {what}'}."
     lead = f"{_listed(names[:tied])} {'fails' if tied == 1 else 'fail'}{' or' * stuck}"
     lead += (" gets stuck" if tied == 1 else " get stuck") * stuck
-    share = f" ({first.percent})" if first.bad else ""
-    text = f"{lead} least: {first.bad:,} of {first.n:,} cases{' each' * (tied > 1 and same_n)}{share}"
-    others = counts[tied:]
+    each = " each" * (tied > 1 and same_n)
+    text = f"{lead} least: {one.bad:,} of {one.n:,} cases{each}" + ("" if zero else f" ({standings[0].percent})")
+    if len(standings[0].counts) > 1:
+        text = f"{lead} least: {standings[0].percent} of {one.n:,} cases{each}"
+    others = standings[tied:]
     named = others[:NAMED] if len(others) > NAMED + 1 else others
-    text += "".join(f"; {one.method} {_number(one, same_n)}" for one in named)
+    text += "".join(f"; {other.method} {other.number(not same_n)}" for other in named)
     if len(others) > len(named):
-        text += f"; {len(others) - len(named)} more up to {_number(others[-1], same_n)} ({others[-1].method})"
-    return f"{text}. {_certainty(names, tied, undecided, sample)}"
+        text += f"; {len(others) - len(named)} more up to {others[-1].number(not same_n)} ({others[-1].method})"
+    return f"{text}. {_certainty(names, tied, undecided, sample, several)}"
 
 
-def _certainty(names: Sequence[str], tied: int, undecided: Sequence[str], sample: bool) -> str:
-    if not sample:
+def _certainty(names: Sequence[str], tied: int, undecided: Sequence[str], sample: bool, several: bool) -> str:
+    if not sample and not several:
         return "The cases are a fixed grid, so these are counts without chance."
-    if not undecided:
-        return f"Every difference from {names[0]} is beyond chance (p < {LEVEL:g}, Holm)."
-    if len(undecided) == len(names) - 1:
-        return f"All differences from {names[0]} are undecided (p ≥ {LEVEL:g}, Holm)."
     open_ = [name for name in names[tied:] if name in undecided]
+    who = names[0] if tied == 1 or open_ else _listed(names[:tied])
+    if not sample:
+        if not open_:
+            return f"Every trained model agrees that {names[0]} is best."
+        return f"Which of {names[0]} and {_listed(open_)} is better depends on the trained model."
     if not open_:
-        return f"Every difference of {_listed(names[:tied])} from the others is beyond chance (p < {LEVEL:g}, Holm)."
-    return f"Differences between {names[0]} and {_listed(open_)} are undecided (p ≥ {LEVEL:g}, Holm)."
-
-
-def _of(one: _Count, what: str) -> str:
-    return f"{one.method}: {one.bad:,} of {one.n:,} cases {what}"
-
-
-def _number(one: _Count, same_n: bool) -> str:
-    return f"{one.bad:,}{'' if same_n else f' of {one.n:,}'} ({one.percent})"
+        return f"Every difference of {who} from the others is beyond chance (p < {LEVEL:g}, Holm)."
+    if len(open_) == len(names) - tied:
+        return f"All differences from {who} are undecided (p ≥ {LEVEL:g}, Holm)."
+    return f"Differences between {who} and {_listed(open_)} are undecided (p ≥ {LEVEL:g}, Holm)."
 
 
 def _listed(names: Sequence[str]) -> str:
