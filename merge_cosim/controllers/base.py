@@ -24,6 +24,9 @@ class Controller(Component):
         """Parameters that are the estimator's where the two are paired, by name: they are set there alone."""
         return {}
 
+    def pair(self, estimator: Estimator) -> None:
+        """Take note of the estimator that drives along, before `start`: for more of it than its log-odds."""
+
     def start(self, count: int, setting: Setting) -> None:
         """Make room for a batch of `count` encounters and forget everything before."""
         self.setting = setting

@@ -33,6 +33,7 @@ class HostDriver:
     def start(self, count: int, setting: Setting) -> None:
         """Make room for a batch of `count` encounters."""
         self.sensor.start(count, setting)
+        self.controller.pair(self.estimator)
         self.estimator.start(count, setting)
         self.controller.start(count, setting)
 

@@ -1,0 +1,136 @@
+"""Escapes: manoeuvres of the host that avoid an overlap whatever the merging driver does within stated bounds."""
+
+from typing import NamedTuple
+
+from numba import njit
+
+from merge_cosim.core.units import FloatArray
+from merge_cosim.estimators.compiled.drivers import TOL
+
+
+class Bounds(NamedTuple):
+    """What the host can do and the merging driver may do, see `merge_cosim.controllers.rollout.Rollout`."""
+
+    min_acceleration: float
+    max_acceleration: float
+    driver_braking: float
+    driver_acceleration: float
+    follower_braking: float
+    follower_reaction: float
+    speed_limit: float
+    dt: float
+    cycles: int
+
+
+@njit(cache=True)
+def escapes(
+    first: float,
+    then: float,
+    host_station: float,
+    host_speed: float,
+    host_length: float,
+    station: float,
+    speed: float,
+    length: float,
+    bounds: Bounds,
+) -> bool:
+    """Whether acceleration `first` for one cycle and `then` ever after avoids an overlap for certain.
+
+    Until the host's front reaches the merging point the driver may do anything within its bounds, so its stations lie
+    between that of full braking and that of full acceleration. If all of them are then upstream of the merging point,
+    the driver follows: after a reaction time it brakes at least with `follower_braking`. If all are a length ahead, it
+    may brake as hard as it can.
+    """
+    dt = bounds.dt
+    top = max(bounds.speed_limit, speed)
+    slow_station, slow_speed = station, speed
+    fast_station, fast_speed = station, speed
+    acceleration = first
+    order = 0  # 1: the driver is behind, 2: ahead
+    since = 0.0
+    for _ in range(bounds.cycles):
+        host_speed = min(max(host_speed + acceleration * dt, 0.0), max(bounds.speed_limit, host_speed))
+        host_station += host_speed * dt
+        acceleration = then
+        slow_speed = max(slow_speed - bounds.driver_braking * dt, 0.0)
+        slow_station += slow_speed * dt
+        if order == 1 and since >= bounds.follower_reaction:
+            fast_speed = max(fast_speed - bounds.follower_braking * dt, 0.0)
+        else:
+            fast_speed = min(fast_speed + bounds.driver_acceleration * dt, top)
+        fast_station += fast_speed * dt
+        if host_station < -TOL:
+            if host_speed <= 0.0:
+                return True
+            continue
+        if order == 0:
+            if fast_station < -TOL:
+                order = 1
+            elif slow_station >= -TOL and slow_station - length >= host_station - TOL:
+                order = 2
+            else:
+                return False
+        since += dt
+        if order == 1:
+            if fast_station >= -TOL and host_station - host_length < fast_station - TOL:
+                return False
+            if since >= bounds.follower_reaction and fast_speed <= host_speed and then >= 0.0:
+                return True
+        else:
+            if slow_station - length < host_station - TOL:
+                return False
+            if then <= 0.0 and host_speed <= slow_speed and host_speed <= 0.0:
+                return True
+        if host_speed <= 0.0 and fast_speed <= 0.0 and slow_speed <= 0.0:
+            return True
+    return False
+
+
+@njit(cache=True)
+def kept(
+    first: float,
+    host_station: float,
+    host_speed: float,
+    host_length: float,
+    station: float,
+    speed: float,
+    length: float,
+    bounds: Bounds,
+) -> bool:
+    """Whether an escape is left after one cycle of acceleration `first`."""
+    for then in (bounds.min_acceleration, bounds.max_acceleration):
+        if escapes(first, then, host_station, host_speed, host_length, station, speed, length, bounds):
+            return True
+    return False
+
+
+@njit(cache=True)
+def constrain(
+    state: FloatArray, wanted: FloatArray, planned: FloatArray, levels: int, bounds: Bounds, status: FloatArray
+) -> None:
+    """Change `wanted` (n,) to the nearest acceleration that keeps an escape, where there is one.
+
+    `status` becomes 0 where no escape exists, 1 where the wanted acceleration keeps one, 2 where it is changed;
+    encounters with `planned` < 0 are left alone.
+    """
+    for row in range(state.shape[1]):
+        if planned[row] < 0:
+            continue
+        h, v, s, u, length_h, length_m = state[:, row]
+        if kept(wanted[row], h, v, length_h, s, u, length_m, bounds):
+            status[row] = 1
+            continue
+        status[row] = 0
+        best = 1e9
+        for bound in (bounds.min_acceleration, bounds.max_acceleration):
+            if not escapes(bound, bound, h, v, length_h, s, u, length_m, bounds):
+                continue
+            for level in range(1, levels + 1):
+                tried = wanted[row] + (bound - wanted[row]) * level / levels
+                if abs(tried - wanted[row]) < abs(best):
+                    if level == levels or escapes(tried, bound, h, v, length_h, s, u, length_m, bounds):
+                        best = tried - wanted[row]
+                        break
+        if best < 1e9:
+            status[row] = 2
+            wanted[row] += best

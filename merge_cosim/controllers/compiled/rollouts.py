@@ -1,0 +1,186 @@
+"""The host's policies driven against each type of driver, step by step, and what each pair costs."""
+
+from math import exp, sqrt
+from typing import NamedTuple
+
+from numba import njit
+
+from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.estimators.compiled.drivers import TOL, DriverLaw, arrival, needed, reacting
+
+FREE, COAST, FOLLOW, BEHIND, FIXED, SUDDEN = 0, 1, 2, 3, 4, 5
+"""Policies; FIXED and SUDDEN hold an acceleration, SUDDEN with no bound on the change."""
+
+
+class HostLaw(NamedTuple):
+    """Constants of the host and of the costs, see `merge_cosim.controllers.rollout.Rollout`."""
+
+    k_free: float
+    k_gap: float
+    k_speed: float
+    d0: float
+    headway: float
+    min_acceleration: float
+    max_acceleration: float
+    behind_margin: float
+    change: float
+    steps: int
+    step: float
+    goal: float
+    scored: float
+    overlap: float
+    pad: float
+    closeness: float
+    gap_scale: float
+    progress: float
+    effort: float
+
+
+@njit(cache=True)
+def host_acceleration(
+    policy: int,
+    held: float,
+    host_station: float,
+    host_speed: float,
+    station: float,
+    speed: float,
+    length: float,
+    host: HostLaw,
+    limit: float,
+) -> float:
+    """Acceleration [m/s^2] that a policy wants, within the host's bounds."""
+    free = host.k_free * (limit - host_speed)
+    follow = (
+        host.k_gap * (station - length - host_station - host.d0 - host.headway * host_speed)
+        + host.k_speed * (speed - host_speed)
+    )
+    if station >= -TOL:
+        wanted = min(follow, free) if station - host_station >= -TOL else free
+    elif policy == FREE:
+        wanted = free
+    elif policy == COAST:
+        wanted = min(0.0, free)
+    elif policy == FOLLOW:
+        wanted = min(follow, free)
+    elif policy == BEHIND:
+        if host_station >= -TOL:
+            wanted = free
+        else:
+            time = arrival(station, speed) + host.behind_margin
+            wanted = min(needed(max(-host_station, 0.1), host_speed, time), free)
+    else:
+        wanted = min(held, free)
+    return min(max(wanted, host.min_acceleration), host.max_acceleration)
+
+
+@njit(cache=True)
+def rollout(
+    policy: int,
+    held: float,
+    kind: int,
+    margin: float,
+    delay: float,
+    host_station: float,
+    host_speed: float,
+    host_length: float,
+    station: float,
+    speed: float,
+    length: float,
+    last: float,
+    host: HostLaw,
+    law: DriverLaw,
+) -> float:
+    """Cost of one policy against one type of driver."""
+    limit = law.speed_limit
+    goal = max(host_station, 0.0) + host.goal
+    closest = 1e9
+    effort = 0.0
+    acceleration = last
+    reached = -1.0
+    both = -1
+    time = 0.0
+    change = host.change * host.step
+    for _ in range(host.steps):
+        wanted = host_acceleration(policy, held, host_station, host_speed, station, speed, length, host, limit)
+        if acceleration < 1e8 and policy != SUDDEN:
+            wanted = min(max(wanted, acceleration - change), acceleration + change)
+        acceleration = wanted
+        driver = 0.0
+        if time >= delay:
+            driver = reacting(kind, margin, host_station, host_speed, host_length, station, speed, law)
+        before = host_speed
+        host_speed = max(host_speed + acceleration * host.step, 0.0)
+        speed = min(max(speed + driver * host.step, 0.0), max(limit, speed))
+        if before > host_speed:
+            effort += (before - host_speed) * (before - host_speed) / host.step
+        if reached < 0.0 and host_station + host_speed * host.step >= goal:
+            reached = time + (goal - host_station) / host_speed
+        host_station += host_speed * host.step
+        station += speed * host.step
+        time += host.step
+        if min(host_station, station) >= -TOL:
+            both += 1
+            if station - host_station >= -TOL:
+                gap = station - length - host_station
+            else:
+                gap = host_station - host_length - station
+            closest = min(closest, gap)
+            if gap < -TOL or both * host.step >= host.scored:
+                break
+    if reached < 0.0:
+        pull = min(max(0.5 * host.k_free * (limit - host_speed), 0.05), host.max_acceleration)
+        reached = time + (sqrt(host_speed * host_speed + 2.0 * pull * (goal - host_station)) - host_speed) / pull
+    cost = host.progress * reached + host.effort * effort + host.closeness * exp(-max(closest, 0.0) / host.gap_scale)
+    if closest < host.pad:
+        cost += host.overlap
+    return cost
+
+
+@njit(cache=True)
+def choose(
+    state: FloatArray,
+    belief: FloatArray,
+    margins: FloatArray,
+    delays: FloatArray,
+    policies: FloatArray,
+    held: FloatArray,
+    last: FloatArray,
+    planned: FloatArray,
+    least: float,
+    commitment: float,
+    host: HostLaw,
+    law: DriverLaw,
+    costs: FloatArray,
+    chosen: IntArray,
+    wanted: FloatArray,
+) -> None:
+    """Fill `costs` (n, policies, types), `chosen` and `wanted` (n,) where `planned` >= 0.
+
+    Types below the belief `least` are left out (cost 0).
+    """
+    for row in range(state.shape[1]):
+        if planned[row] < 0:
+            continue
+        h, v, s, u, length_h, length_m = state[:, row]
+        best, best_cost, kept_cost = -1, 0.0, 0.0
+        for policy in range(policies.shape[0]):
+            expected = 0.0
+            for kind in range(belief.shape[1]):
+                cost = 0.0
+                if belief[row, kind] >= least:
+                    cost = rollout(
+                        int(policies[policy]), held[policy], kind, margins[row, kind], delays[row], h, v, length_h, s, u, length_m,
+                        last[row], host, law,
+                    )
+                costs[row, policy, kind] = cost
+                expected += belief[row, kind] * cost
+            if best < 0 or expected < best_cost:
+                best, best_cost = policy, expected
+            if policy == chosen[row]:
+                kept_cost = expected
+        if chosen[row] < 0 or best_cost < kept_cost - commitment:
+            chosen[row] = best
+        policy = chosen[row]
+        wanted[row] = host_acceleration(
+            int(policies[policy]), held[policy], h, v, s, u, length_m, host, law.speed_limit
+        )

@@ -1,0 +1,211 @@
+"""A planner that rolls policies out against drivers who react to them, and keeps an escape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from merge_cosim.controllers.acc import Acc
+from merge_cosim.controllers.base import controllers
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.registry import parameters
+from merge_cosim.core.units import Acceleration, BoolArray, Count, FloatArray, IntArray, Share
+from merge_cosim.estimators.base import Estimator
+from merge_cosim.estimators.driver_types import DRIVER_TYPES, ReactingDriver
+
+POLICIES = ("free", "coast", "follow", "behind", "brake 1", "brake 2", "brake 4", "accelerate 1", "accelerate 2")
+"""The policies, in the order of the costs."""
+_KIND = np.array([0.0, 1, 2, 3, 4, 4, 5, 4, 5])
+_HELD = np.array([0.0, 0, 0, 0, -1, -2, -4, 1, 2])
+OVER = -1.0
+
+
+@controllers.register
+@dataclass(kw_only=True)
+class Rollout(ReactingDriver, Acc):
+    """Expected cost of closed-loop policies over types of drivers who react, with commitment and an escape.
+
+    Each cycle, each policy of `POLICIES` is driven for `steps * step` seconds against each type of driver
+    (`ReactingDriver`), who plans anew in every step where the rolled-out host is. The policy with the least expected
+    cost `J(pi) = sum_D b(D) [overlap 1{gap < pad} + closeness exp(-gap / gap_scale) + progress t_goal +
+    effort int a_brake^2 dt]` is driven; `gap` is the smallest with both cars past the merging point, `t_goal` the time
+    at which the host is `goal` past it. The policy of the last cycle is kept unless another is better by `commitment`.
+    The command changes by at most `max_jerk * dt` a cycle.
+
+    Then a constraint: where an escape exists (full braking or full acceleration that avoids an overlap whatever a
+    driver within stated bounds does), the command is the nearest one that leaves an escape for the next cycle.
+
+    Once the merging car is in the lane the law of acc drives. Beliefs are those of an estimator that has them
+    (`beliefs`); of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left
+    to `yield`, or to `wait` where the merging car is slower than `standing`.
+
+    Attributes:
+        behind_margin: Time behind the merging car's present arrival that the policy `behind` aims at [s].
+        steps: Number of steps rolled out.
+        step: Length of a step [s].
+        goal: Way past the merging point at which progress is measured [m].
+        scored: Time during which gaps count from when both cars have reached the merging point [s].
+        overlap: Cost of an overlap.
+        pad: Gap below which cars count as overlapping [m].
+        closeness: Cost of closeness.
+        gap_scale: Gap at which closeness has fallen to 1/e [m].
+        progress: Cost of time [1/s].
+        effort: Cost of braking [s^3/m^2].
+        commitment: How much better another policy must be.
+        max_jerk: Largest change of the command but for an escape [m/s^3].
+        escape: Keep an escape.
+        escape_braking: A driver's hardest braking as the escape allows for [m/s^2].
+        escape_acceleration: A driver's hardest acceleration as the escape allows for [m/s^2].
+        follower_braking: Braking that a driver behind the host is sure to have [m/s^2].
+        follower_reaction: Time after which it brakes [s].
+        least_belief: Types with less belief are not rolled out.
+        ignore_share: Belief in `ignore` where the estimator has log-odds only.
+        standing: Speed below which a merging car may be waiting for the host [m/s].
+    """
+
+    name: ClassVar[str] = "rollout"
+    default_estimator: ClassVar[str] = "interactive"
+    behind_margin: NonNegativeFloat = 1.2
+    steps: Count = 32
+    step: PositiveFloat = 0.25
+    goal: PositiveFloat = 50.0
+    scored: PositiveFloat = 3.0
+    overlap: NonNegativeFloat = 1000.0
+    pad: NonNegativeFloat = 0.0
+    closeness: NonNegativeFloat = 3.0
+    gap_scale: PositiveFloat = 3.0
+    progress: NonNegativeFloat = 1.0
+    effort: NonNegativeFloat = 0.05
+    commitment: NonNegativeFloat = 0.05
+    max_jerk: PositiveFloat = 3.0
+    escape: bool = True
+    escape_braking: NonNegativeFloat = 4.0
+    escape_acceleration: Acceleration = 3.0
+    follower_braking: PositiveFloat = 3.0
+    follower_reaction: NonNegativeFloat = 0.3
+    least_belief: Share = 0.001
+    ignore_share: Annotated[float, Field(ge=0, lt=1)] = 0.2
+    standing: NonNegativeFloat = 1.0
+
+    def taken_from(self, estimator: Estimator) -> dict[str, Any]:
+        """The drivers of an estimator that has the same kinds."""
+        if not isinstance(estimator, ReactingDriver):
+            return {}
+        return {name: getattr(estimator, name) for name in parameters(ReactingDriver)}
+
+    def pair(self, estimator: Estimator) -> None:
+        """Take beliefs from an estimator that has them."""
+        self._estimator = estimator if isinstance(estimator, ReactingDriver) else None
+
+    def start(self, count: int, setting: Setting) -> None:
+        """Make room for the last commands and policies."""
+        from merge_cosim.controllers.compiled.escapes import Bounds
+        from merge_cosim.controllers.compiled.rollouts import HostLaw
+
+        super().start(count, setting)
+        self._driver_law = self.law(setting)
+        self._host_law = HostLaw(
+            self.k_free,
+            self.k_gap,
+            self.k_speed,
+            self.d0,
+            self.headway,
+            self.min_acceleration,
+            self.max_acceleration,
+            self.behind_margin,
+            self.max_jerk,
+            self.steps,
+            self.step,
+            self.goal,
+            self.scored,
+            self.overlap,
+            self.pad,
+            self.closeness,
+            self.gap_scale,
+            self.progress,
+            self.effort,
+        )
+        self._bounds = Bounds(
+            self.min_acceleration,
+            self.max_acceleration,
+            self.escape_braking,
+            self.escape_acceleration,
+            self.follower_braking,
+            self.follower_reaction,
+            setting.speed_limit,
+            setting.dt,
+            round(20.0 / setting.dt),
+        )
+        self._margins = np.full((count, len(DRIVER_TYPES)), self.driver_margin)
+        self._delays = np.zeros(count)
+        self._last = np.full(count, np.nan)
+        self.last_policy = np.full(count, -1)
+        self.last_costs = np.zeros((count, len(POLICIES), len(DRIVER_TYPES)))
+        self.escape_status = np.zeros(count)
+
+    def reset(self, rows: IntArray) -> None:
+        """Forget the last commands and policies at `rows`."""
+        self._last[rows] = np.nan
+        self.last_policy[rows] = -1
+
+    def belief(self, seen: Observation, log_odds: FloatArray) -> FloatArray:
+        """Belief over `DRIVER_TYPES`, shape (n, types)."""
+        if getattr(self, "_estimator", None) is not None:
+            return self._estimator.beliefs
+        not_yield = (0.5 + 0.5 * np.tanh(0.5 * log_odds)) * (1.0 - self.ignore_share)
+        yields = 1.0 - self.ignore_share - not_yield
+        waits = np.where(seen.merging_speed < self.standing, yields, 0.0)
+        ignores = np.full_like(yields, self.ignore_share)
+        return np.stack([yields - waits, not_yield, ignores, waits], axis=1)
+
+    def _timing(self) -> tuple[FloatArray, FloatArray]:
+        """Margin of each type [s], shape (n, types), and the time until a driver reacts [s], shape (n,)."""
+        if getattr(self, "_estimator", None) is None:
+            return self._margins, self._delays
+        return self._estimator.margins, self._estimator.unreacted * self._estimator.reaction_time
+
+    def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
+        """The cheapest policy's acceleration, with commitment, bounded jerk and an escape."""
+        from merge_cosim.controllers.compiled.escapes import constrain
+        from merge_cosim.controllers.compiled.rollouts import choose
+
+        following = super().command(seen, log_odds, target)
+        state = np.array(
+            [
+                seen.host_station,
+                seen.host_speed,
+                seen.merging_station,
+                seen.merging_speed,
+                seen.host_length,
+                seen.merging_length,
+            ]
+        )
+        planned = np.where(seen.merging_in_lane, OVER, 1.0)
+        first = np.isnan(self._last)
+        wanted = following.copy()
+        choose(
+            state,
+            np.ascontiguousarray(self.belief(seen, log_odds)),
+            *self._timing(),
+            _KIND,
+            _HELD,
+            np.where(first, 1e9, self._last),
+            planned,
+            self.least_belief,
+            self.commitment,
+            self._host_law,
+            self._driver_law,
+            self.last_costs,
+            self.last_policy,
+            wanted,
+        )
+        change = self.max_jerk * self.setting.dt
+        smooth = np.minimum(np.maximum(wanted, self._last - change), self._last + change)
+        command = np.where(first | (planned < 0) | (_KIND[self.last_policy] == 5), wanted, smooth)
+        if self.escape:
+            constrain(state, command, planned, 8, self._bounds, self.escape_status)
+        self._last = command.copy()
+        return command

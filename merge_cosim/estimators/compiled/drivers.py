@@ -1,0 +1,89 @@
+"""How a merging driver of each type accelerates, given where the host is: one law for the filter and for the rollouts.
+
+Everything is scalar and compiled without reordering of sums, so that a result does not depend on the batch.
+"""
+
+from typing import NamedTuple
+
+from numba import njit
+
+TOL = 1e-6
+NEAR = 0.1
+"""Way [m] below which an acceleration is no longer computed from the way left."""
+YIELD, NOT_YIELD, IGNORE, WAIT = 0, 1, 2, 3
+
+
+class DriverLaw(NamedTuple):
+    """Constants of the drivers, see `merge_cosim.estimators.driver_types.ReactingDriver`."""
+
+    min_acceleration: float
+    max_acceleration: float
+    critical_gap: float
+    comfortable_braking: float
+    start_acceleration: float
+    k_free: float
+    k_gap: float
+    k_speed: float
+    d0: float
+    headway: float
+    speed_limit: float
+    dt: float
+
+
+@njit(cache=True)
+def arrival(station: float, speed: float) -> float:
+    """Time [s] to reach station 0 at the present speed, as `time_to_arrival`."""
+    return max(-station, 0.0) / max(speed, 0.5)
+
+
+@njit(cache=True)
+def needed(way: float, speed: float, time: float) -> float:
+    """Constant acceleration [m/s^2] that covers `way` in `time`; where that would stop short, the stop at the point."""
+    if speed * time > 2.0 * way:
+        return -speed * speed / (2.0 * way)
+    return 2.0 * (way - speed * time) / (time * time)
+
+
+@njit(cache=True)
+def planned(kind: int, margin: float, host_arrival: float, station: float, speed: float, law: DriverLaw) -> float:
+    """Acceleration [m/s^2] that a driver of a type plans before either car has reached the merging point."""
+    way = max(-station, NEAR)
+    if kind == YIELD:
+        wanted = min(needed(way, speed, max(host_arrival + margin, law.dt)), 0.0)
+    elif kind == NOT_YIELD:
+        wanted = max(needed(way, speed, max(host_arrival - margin, law.dt)), 0.0)
+    elif kind == IGNORE:
+        wanted = 0.0
+    elif host_arrival - arrival(station, speed) >= law.critical_gap:
+        wanted = min(law.start_acceleration, law.k_free * (law.speed_limit - speed))
+    else:
+        stop = -speed * speed / (2.0 * way)
+        wanted = stop if stop <= -law.comfortable_braking else 0.0
+    return min(max(wanted, law.min_acceleration), law.max_acceleration)
+
+
+@njit(cache=True)
+def reacting(
+    kind: int,
+    margin: float,
+    host_station: float,
+    host_speed: float,
+    host_length: float,
+    station: float,
+    speed: float,
+    law: DriverLaw,
+) -> float:
+    """Acceleration [m/s^2] of a driver of a type: its plan, and once a car has passed, distance keeping.
+
+    A driver that ignores the host holds the speed throughout.
+    """
+    if kind == IGNORE:
+        return 0.0
+    if max(host_station, station) < -TOL:
+        return planned(kind, margin, arrival(host_station, host_speed), station, speed, law)
+    wanted = law.k_free * (law.speed_limit - speed)
+    lead = host_station - station
+    if lead > TOL:
+        gap = lead - host_length - law.d0 - law.headway * speed
+        wanted = min(wanted, law.k_gap * gap + law.k_speed * (host_speed - speed))
+    return min(max(wanted, law.min_acceleration), law.max_acceleration)

@@ -1,0 +1,100 @@
+"""The filter over driver types, one encounter after the other."""
+
+from math import exp, log, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.estimators.compiled.drivers import IGNORE, NOT_YIELD, DriverLaw, arrival, reacting
+
+
+class FilterLaw(NamedTuple):
+    """Constants of the filter, see `merge_cosim.estimators.interactive.Interactive`."""
+
+    keep: float
+    sigma: float
+    innovation: float
+    outlier: float
+    reacts: float
+    changes: float
+
+
+@njit(cache=True)
+def update(
+    host_station: FloatArray,
+    host_speed: FloatArray,
+    station: FloatArray,
+    speed: FloatArray,
+    host_length: FloatArray,
+    kinds: IntArray,
+    margins: FloatArray,
+    prior: FloatArray,
+    law: DriverLaw,
+    filter_law: FilterLaw,
+    weight: FloatArray,
+    expected: FloatArray,
+    off: FloatArray,
+    last_speed: FloatArray,
+    age: IntArray,
+    beliefs: FloatArray,
+    mean_margins: FloatArray,
+    unreacted: FloatArray,
+    log_odds: FloatArray,
+) -> None:
+    """One cycle of all encounters; see `Interactive`."""
+    hypotheses = kinds.shape[0]
+    for row in range(station.shape[0]):
+        if not np.isnan(last_speed[row]):
+            acceleration = (speed[row] - last_speed[row]) / law.dt
+            # what changes between the cycles
+            for one in range(hypotheses):
+                moved = weight[row, 0, one] * filter_law.reacts
+                weight[row, 0, one] -= moved
+                weight[row, 1, one] += moved
+            for acts in range(2):
+                total = 0.0
+                for one in range(hypotheses):
+                    total += weight[row, acts, one]
+                for one in range(hypotheses):
+                    weight[row, acts, one] += filter_law.changes * (prior[one] * total - weight[row, acts, one])
+            total = 0.0
+            for acts in range(2):
+                for one in range(hypotheses):
+                    mean = expected[row, one] if acts == 1 else 0.0
+                    n = acceleration - mean
+                    if age[row] == 1:
+                        e, s = n, sqrt(filter_law.sigma**2 + filter_law.innovation**2)
+                    else:
+                        e, s = n - filter_law.keep * off[row, acts, one], filter_law.innovation
+                    off[row, acts, one] = n
+                    p = (1.0 - filter_law.outlier) * exp(-0.5 * e * e / (s * s)) / (s * sqrt(2.0 * pi))
+                    p += filter_law.outlier * 0.1
+                    weight[row, acts, one] *= p
+                    total += weight[row, acts, one]
+            for acts in range(2):
+                for one in range(hypotheses):
+                    weight[row, acts, one] /= total
+        for kind in range(beliefs.shape[1]):
+            beliefs[row, kind] = 0.0
+            mean_margins[row, kind] = 0.0
+        unreacted[row] = 0.0
+        for one in range(hypotheses):
+            both = weight[row, 0, one] + weight[row, 1, one]
+            beliefs[row, kinds[one]] += both
+            mean_margins[row, kinds[one]] += both * margins[one]
+            unreacted[row] += weight[row, 0, one]
+            expected[row, one] = reacting(
+                kinds[one], margins[one], host_station[row], host_speed[row], host_length[row],
+                station[row], speed[row], law,
+            )
+        for kind in range(beliefs.shape[1]):
+            mean_margins[row, kind] /= max(beliefs[row, kind], 1e-300)
+        last_speed[row] = speed[row]
+        age[row] += 1
+        first = arrival(station[row], speed[row]) < arrival(host_station[row], host_speed[row])
+        not_yield = beliefs[row, NOT_YIELD] + (beliefs[row, IGNORE] if first else 0.0)
+        not_yield = min(max(not_yield, 1e-6), 1.0 - 1e-6)
+        log_odds[row] = log(not_yield / (1.0 - not_yield))
+

@@ -1,0 +1,63 @@
+"""Types of merging drivers that react to the host, shared by the interactive filter and the rollouts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pydantic import NonNegativeFloat, PositiveFloat
+
+from merge_cosim.core.observation import Setting
+from merge_cosim.core.units import Acceleration, Braking
+
+if TYPE_CHECKING:
+    from merge_cosim.estimators.compiled.drivers import DriverLaw
+
+DRIVER_TYPES = ("yield", "not_yield", "ignore", "wait")
+"""The types, in the order of every array of beliefs."""
+
+
+@dataclass(kw_only=True)
+class ReactingDriver:
+    """What a merging driver of each type does, given the host's present arrival T_h.
+
+    `need(T) = 2 (d - v T) / T^2` covers the way d to the merging point in the time T; where that would stop the car
+    before the point, it is the stop at the point, `-v^2 / (2 d)`. `yield`: `min(need(T_h + m), 0)`. `not_yield`:
+    `max(need(T_h - m), 0)`. `ignore`: 0, throughout. `wait`: goes once it arrives `critical_gap` before the host, and
+    else stops at the merging point. Once either car has reached the merging point, all but `ignore` keep distance
+    behind a host ahead, and drive freely without one.
+
+    Attributes:
+        driver_margin: Margin m between the two arrivals [s].
+        driver_min_acceleration: A driver's hardest braking, negative [m/s^2].
+        driver_max_acceleration: A driver's hardest acceleration [m/s^2].
+        critical_gap: Time before the host's arrival that a waiting driver needs to go [s].
+        waiting_braking: Braking at which a waiting driver begins to stop [m/s^2].
+        driver_headway: Time headway behind a host that has passed [s].
+    """
+
+    driver_margin: NonNegativeFloat = 1.2
+    driver_min_acceleration: Braking = -4.0
+    driver_max_acceleration: Acceleration = 3.0
+    critical_gap: NonNegativeFloat = 2.0
+    waiting_braking: PositiveFloat = 1.5
+    driver_headway: NonNegativeFloat = 0.8
+
+    def law(self, setting: Setting) -> DriverLaw:
+        """The constants as the compiled loops take them."""
+        from merge_cosim.estimators.compiled.drivers import DriverLaw
+
+        return DriverLaw(
+            self.driver_min_acceleration,
+            self.driver_max_acceleration,
+            self.critical_gap,
+            self.waiting_braking,
+            self.driver_max_acceleration,
+            0.4,
+            0.23,
+            0.6,
+            2.0,
+            self.driver_headway,
+            setting.speed_limit,
+            setting.dt,
+        )
