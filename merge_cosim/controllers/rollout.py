@@ -15,12 +15,29 @@ from merge_cosim.core.registry import parameters
 from merge_cosim.core.units import Acceleration, BoolArray, Count, FloatArray, IntArray, Share
 from merge_cosim.estimators.base import Estimator
 from merge_cosim.estimators.driver_types import DRIVER_TYPES, ReactingDriver
+from merge_cosim.estimators.interactive import Interactive
 
-POLICIES = ("free", "coast", "follow", "behind", "brake 1", "brake 2", "brake 4", "accelerate 1", "accelerate 2")
-"""The policies, in the order of the costs."""
-_KIND = np.array([0.0, 1, 2, 3, 4, 4, 5, 4, 5])
-_HELD = np.array([0.0, 0, 0, 0, -1, -2, -4, 1, 2])
-OVER = -1.0
+STATE = ("host_station", "host_speed", "merging_station", "merging_speed", "host_length", "merging_length")
+"""Rows of the state that the compiled loops take, all of an `Observation`."""
+_FREE, _COAST, _FOLLOW, _BEHIND, _HELD, _SUDDEN = range(6)
+_POLICIES = (
+    ("free", _FREE, 0.0),
+    ("coast", _COAST, 0.0),
+    ("follow", _FOLLOW, 0.0),
+    ("behind", _BEHIND, 0.0),
+    ("brake 1", _HELD, -1.0),
+    ("brake 2", _HELD, -2.0),
+    ("brake 4", _SUDDEN, -4.0),
+    ("accelerate 1", _HELD, 1.0),
+    ("accelerate 2", _SUDDEN, 2.0),
+)
+POLICIES = tuple(name for name, _, _ in _POLICIES)
+"""The policies, in the order of the costs: free driving; the present speed; following the merging car as if it were in
+the lane; arriving behind it; an acceleration [m/s^2] that is held, the hardest two without a bound on the jerk."""
+_LEVELS = 8
+"""Accelerations tried between the wanted one and an escape's."""
+_ESCAPE_TIME = 20.0
+"""Time [s] within which an escape must have ended."""
 
 
 @controllers.register
@@ -57,6 +74,7 @@ class Rollout(ReactingDriver, Acc):
         commitment: How much better another policy must be.
         max_jerk: Largest change of the command but for an escape [m/s^3].
         escape: Keep an escape.
+        tolerated_risk: Least belief in drivers that the plan overlaps with for which an escape is kept; 0: always kept.
         escape_braking: A driver's hardest braking as the escape allows for [m/s^2].
         escape_acceleration: A driver's hardest acceleration as the escape allows for [m/s^2].
         follower_braking: Braking that a driver behind the host is sure to have [m/s^2].
@@ -73,15 +91,16 @@ class Rollout(ReactingDriver, Acc):
     step: PositiveFloat = 0.25
     goal: PositiveFloat = 50.0
     scored: PositiveFloat = 3.0
-    overlap: NonNegativeFloat = 1000.0
-    pad: NonNegativeFloat = 0.0
+    overlap: NonNegativeFloat = 20.0
+    pad: NonNegativeFloat = 1.0
     closeness: NonNegativeFloat = 3.0
     gap_scale: PositiveFloat = 3.0
     progress: NonNegativeFloat = 1.0
-    effort: NonNegativeFloat = 0.05
-    commitment: NonNegativeFloat = 0.05
+    effort: NonNegativeFloat = 0.1
+    commitment: NonNegativeFloat = 0.2
     max_jerk: PositiveFloat = 3.0
     escape: bool = True
+    tolerated_risk: Share = 0.0
     escape_braking: NonNegativeFloat = 4.0
     escape_acceleration: Acceleration = 3.0
     follower_braking: PositiveFloat = 3.0
@@ -98,7 +117,12 @@ class Rollout(ReactingDriver, Acc):
 
     def pair(self, estimator: Estimator) -> None:
         """Take beliefs from an estimator that has them."""
-        self._estimator = estimator if isinstance(estimator, ReactingDriver) else None
+        self._paired = estimator if isinstance(estimator, Interactive) else None
+
+    @property
+    def _filter(self) -> Interactive | None:
+        """The estimator that has beliefs; None for another, or without one."""
+        return vars(self).get("_paired")
 
     def start(self, count: int, setting: Setting) -> None:
         """Make room for the last commands and policies."""
@@ -137,75 +161,69 @@ class Rollout(ReactingDriver, Acc):
             self.follower_reaction,
             setting.speed_limit,
             setting.dt,
-            round(20.0 / setting.dt),
+            round(_ESCAPE_TIME / setting.dt),
         )
+        self._kinds = np.array([kind for _, kind, _ in _POLICIES])
+        self._held = np.array([held for _, _, held in _POLICIES])
         self._margins = np.full((count, len(DRIVER_TYPES)), self.driver_margin)
         self._delays = np.zeros(count)
         self._last = np.full(count, np.nan)
         self.last_policy = np.full(count, -1)
         self.last_costs = np.zeros((count, len(POLICIES), len(DRIVER_TYPES)))
-        self.escape_status = np.zeros(count)
+        self.last_belief = np.zeros((count, len(DRIVER_TYPES)))
+        self.risk = np.zeros(count)
+        self.escape_status = np.zeros(count, dtype=np.int64)
 
     def reset(self, rows: IntArray) -> None:
         """Forget the last commands and policies at `rows`."""
         self._last[rows] = np.nan
         self.last_policy[rows] = -1
 
-    def belief(self, seen: Observation, log_odds: FloatArray) -> FloatArray:
-        """Belief over `DRIVER_TYPES`, shape (n, types)."""
-        if getattr(self, "_estimator", None) is not None:
-            return self._estimator.beliefs
-        not_yield = (0.5 + 0.5 * np.tanh(0.5 * log_odds)) * (1.0 - self.ignore_share)
-        yields = 1.0 - self.ignore_share - not_yield
-        waits = np.where(seen.merging_speed < self.standing, yields, 0.0)
-        ignores = np.full_like(yields, self.ignore_share)
-        return np.stack([yields - waits, not_yield, ignores, waits], axis=1)
-
-    def _timing(self) -> tuple[FloatArray, FloatArray]:
-        """Margin of each type [s], shape (n, types), and the time until a driver reacts [s], shape (n,)."""
-        if getattr(self, "_estimator", None) is None:
-            return self._margins, self._delays
-        return self._estimator.margins, self._estimator.unreacted * self._estimator.reaction_time
-
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """The cheapest policy's acceleration, with commitment, bounded jerk and an escape."""
         from merge_cosim.controllers.compiled.escapes import constrain
         from merge_cosim.controllers.compiled.rollouts import choose
 
-        following = super().command(seen, log_odds, target)
-        state = np.array(
-            [
-                seen.host_station,
-                seen.host_speed,
-                seen.merging_station,
-                seen.merging_speed,
-                seen.host_length,
-                seen.merging_length,
-            ]
-        )
-        planned = np.where(seen.merging_in_lane, OVER, 1.0)
-        first = np.isnan(self._last)
-        wanted = following.copy()
+        wanted = super().command(seen, log_odds, target)
+        state = np.stack([getattr(seen, name) for name in STATE])
+        plans = ~seen.merging_in_lane
+        self.last_belief = self._belief(seen, log_odds)
+        margins, delays = self._margins, self._delays
+        if self._filter is not None:
+            margins, delays = self._filter.margins, self._filter.unreacted * self._filter.reaction_time
         choose(
             state,
-            np.ascontiguousarray(self.belief(seen, log_odds)),
-            *self._timing(),
-            _KIND,
-            _HELD,
-            np.where(first, 1e9, self._last),
-            planned,
+            plans,
+            self.last_belief,
+            margins,
+            delays,
+            self._kinds,
+            self._held,
+            self._last,
             self.least_belief,
             self.commitment,
             self._host_law,
             self._driver_law,
             self.last_costs,
             self.last_policy,
+            self.risk,
             wanted,
         )
         change = self.max_jerk * self.setting.dt
         smooth = np.minimum(np.maximum(wanted, self._last - change), self._last + change)
-        command = np.where(first | (planned < 0) | (_KIND[self.last_policy] == 5), wanted, smooth)
+        free_to_change = np.isnan(self._last) | ~plans | (self._kinds[self.last_policy] == _SUDDEN)
+        command = np.where(free_to_change, wanted, smooth)
         if self.escape:
-            constrain(state, command, planned, 8, self._bounds, self.escape_status)
+            guarded = np.where(plans, self.risk >= self.tolerated_risk, seen.merging_ahead)
+            constrain(state, guarded, _LEVELS, self._bounds, command, self.escape_status)
         self._last = command.copy()
         return command
+
+    def _belief(self, seen: Observation, log_odds: FloatArray) -> FloatArray:
+        """Belief over `DRIVER_TYPES`, shape (n, types)."""
+        if self._filter is not None:
+            return self._filter.beliefs
+        not_yield = (0.5 + 0.5 * np.tanh(0.5 * log_odds)) * (1.0 - self.ignore_share)
+        yields = 1.0 - self.ignore_share - not_yield
+        waits = np.where(seen.merging_speed < self.standing, yields, 0.0)
+        return np.stack([yields - waits, not_yield, np.full_like(yields, self.ignore_share), waits], axis=1)

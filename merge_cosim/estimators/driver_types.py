@@ -34,6 +34,10 @@ class ReactingDriver:
         critical_gap: Time before the host's arrival that a waiting driver needs to go [s].
         waiting_braking: Braking at which a waiting driver begins to stop [m/s^2].
         driver_headway: Time headway behind a host that has passed [s].
+        driver_d0: Gap at standstill behind it [m].
+        driver_k_free: Gain of free driving [1/s].
+        driver_k_gap: Gain on the gap error behind a host [1/s^2].
+        driver_k_speed: Gain on the speed difference to it [1/s].
     """
 
     driver_margin: NonNegativeFloat = 1.2
@@ -42,22 +46,25 @@ class ReactingDriver:
     critical_gap: NonNegativeFloat = 2.0
     waiting_braking: PositiveFloat = 1.5
     driver_headway: NonNegativeFloat = 0.8
+    driver_d0: NonNegativeFloat = 2.0
+    driver_k_free: PositiveFloat = 0.4
+    driver_k_gap: PositiveFloat = 0.23
+    driver_k_speed: PositiveFloat = 0.6
 
     def law(self, setting: Setting) -> DriverLaw:
         """The constants as the compiled loops take them."""
         from merge_cosim.estimators.compiled.drivers import DriverLaw
 
         return DriverLaw(
-            self.driver_min_acceleration,
-            self.driver_max_acceleration,
-            self.critical_gap,
-            self.waiting_braking,
-            self.driver_max_acceleration,
-            0.4,
-            0.23,
-            0.6,
-            2.0,
-            self.driver_headway,
-            setting.speed_limit,
-            setting.dt,
+            min_acceleration=self.driver_min_acceleration,
+            max_acceleration=self.driver_max_acceleration,
+            critical_gap=self.critical_gap,
+            waiting_braking=self.waiting_braking,
+            k_free=self.driver_k_free,
+            k_gap=self.driver_k_gap,
+            k_speed=self.driver_k_speed,
+            d0=self.driver_d0,
+            headway=self.driver_headway,
+            speed_limit=setting.speed_limit,
+            dt=setting.dt,
         )

@@ -54,16 +54,18 @@ class Interactive(ReactingDriver, Estimator):
         keep = float(np.exp(-setting.dt / self.correlation_time))
         innovation = float(np.sqrt(self.sigma**2 * (1 - keep**2) + self.white**2))
         self._filter_law = FilterLaw(
-            keep, self.sigma, innovation, self.outlier, 1.0 - float(np.exp(-setting.dt / max(self.reaction_time, 1e-9))),
+            keep,
+            self.sigma,
+            innovation,
+            self.outlier,
+            1.0 - float(np.exp(-setting.dt / max(self.reaction_time, 1e-9))),
             self.change_rate * setting.dt,
         )
         margins = np.linspace(self.min_margin, self.max_margin, 3)
         self._kinds = np.array([0, 0, 0, 1, 1, 1, 2, 3])
         self._hypothesis_margins = np.array([*margins, *margins, 0.0, 0.0])  # ignore and wait have none
         wait = max(1.0 - self.start_yield - self.start_not_yield - self.start_ignore, 0.0)
-        self._prior = np.array(
-            [*[self.start_yield / 3] * 3, *[self.start_not_yield / 3] * 3, self.start_ignore, wait]
-        )
+        self._prior = np.array([*[self.start_yield / 3] * 3, *[self.start_not_yield / 3] * 3, self.start_ignore, wait])
         self._weight = np.zeros((count, 2, len(self._kinds)))
         self._expected = np.zeros((count, len(self._kinds)))
         self._off = np.zeros((count, 2, len(self._kinds)))
@@ -87,9 +89,24 @@ class Interactive(ReactingDriver, Estimator):
 
         log_odds = np.empty(len(seen.merging_speed))
         update(
-            seen.host_station, seen.host_speed, seen.merging_station, seen.merging_speed, seen.host_length,
-            self._kinds, self._hypothesis_margins, self._prior,
-            self._law, self._filter_law, self._weight, self._expected, self._off, self._last_speed, self._age,
-            self.beliefs, self.margins, self.unreacted, log_odds,
+            seen.host_station,
+            seen.host_speed,
+            seen.merging_station,
+            seen.merging_speed,
+            seen.host_length,
+            self._kinds,
+            self._hypothesis_margins,
+            self._prior,
+            self._law,
+            self._filter_law,
+            self._weight,
+            self._expected,
+            self._off,
+            self._last_speed,
+            self._age,
+            self.beliefs,
+            self.margins,
+            self.unreacted,
+            log_odds,
         )
         return log_odds

@@ -2,10 +2,16 @@
 
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
-from merge_cosim.core.units import FloatArray
+from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.estimators.compiled.drivers import TOL
+
+SHORT = 0.1
+"""Way before the merging point [m] within which the host counts as having reached it."""
+NONE, LEFT, FORCED = 0, 1, 2
+"""No escape exists; the wanted acceleration leaves one; the acceleration was changed to leave one."""
 
 
 class Bounds(NamedTuple):
@@ -59,7 +65,7 @@ def escapes(
         else:
             fast_speed = min(fast_speed + bounds.driver_acceleration * dt, top)
         fast_station += fast_speed * dt
-        if host_station < -TOL:
+        if host_station < -SHORT:
             if host_speed <= 0.0:
                 return True
             continue
@@ -106,31 +112,35 @@ def kept(
 
 @njit(cache=True)
 def constrain(
-    state: FloatArray, wanted: FloatArray, planned: FloatArray, levels: int, bounds: Bounds, status: FloatArray
+    state: FloatArray, guarded: BoolArray, levels: int, bounds: Bounds, wanted: FloatArray, status: IntArray
 ) -> None:
-    """Change `wanted` (n,) to the nearest acceleration that keeps an escape, where there is one.
+    """Change accelerations to the nearest ones that leave an escape, where there is an escape.
 
-    `status` becomes 0 where no escape exists, 1 where the wanted acceleration keeps one, 2 where it is changed;
-    encounters with `planned` < 0 are left alone.
+    Args:
+        state: The rows of an `Observation`, shape (6, n).
+        guarded: Encounters that are looked at, shape (n,).
+        levels: Number of steps between the wanted acceleration and the escape's that are tried.
+        bounds: What the host can do and the merging driver may do.
+        wanted: Accelerations [m/s^2], to be changed, shape (n,).
+        status: To be filled: `NONE`, `LEFT` or `FORCED`, shape (n,).
     """
     for row in range(state.shape[1]):
-        if planned[row] < 0:
+        if not guarded[row]:
             continue
         h, v, s, u, length_h, length_m = state[:, row]
-        if kept(wanted[row], h, v, length_h, s, u, length_m, bounds):
-            status[row] = 1
+        first = wanted[row]
+        status[row] = LEFT
+        if kept(first, h, v, length_h, s, u, length_m, bounds):
             continue
-        status[row] = 0
-        best = 1e9
+        status[row] = NONE
+        nearest = np.inf
         for bound in (bounds.min_acceleration, bounds.max_acceleration):
             if not escapes(bound, bound, h, v, length_h, s, u, length_m, bounds):
                 continue
+            status[row] = FORCED
             for level in range(1, levels + 1):
-                tried = wanted[row] + (bound - wanted[row]) * level / levels
-                if abs(tried - wanted[row]) < abs(best):
-                    if level == levels or escapes(tried, bound, h, v, length_h, s, u, length_m, bounds):
-                        best = tried - wanted[row]
-                        break
-        if best < 1e9:
-            status[row] = 2
-            wanted[row] += best
+                tried = first + (bound - first) * level / levels
+                if level == levels or escapes(tried, bound, h, v, length_h, s, u, length_m, bounds):
+                    if abs(tried - first) < nearest:
+                        nearest, wanted[row] = abs(tried - first), tried
+                    break

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.estimators.compiled.drivers import TOL, DriverLaw, arrival, needed, reacting
 
 FREE, COAST, FOLLOW, BEHIND, FIXED, SUDDEN = 0, 1, 2, 3, 4, 5
@@ -50,9 +50,8 @@ def host_acceleration(
 ) -> float:
     """Acceleration [m/s^2] that a policy wants, within the host's bounds."""
     free = host.k_free * (limit - host_speed)
-    follow = (
-        host.k_gap * (station - length - host_station - host.d0 - host.headway * host_speed)
-        + host.k_speed * (speed - host_speed)
+    follow = host.k_gap * (station - length - host_station - host.d0 - host.headway * host_speed) + host.k_speed * (
+        speed - host_speed
     )
     if station >= -TOL:
         wanted = min(follow, free) if station - host_station >= -TOL else free
@@ -89,8 +88,8 @@ def rollout(
     last: float,
     host: HostLaw,
     law: DriverLaw,
-) -> float:
-    """Cost of one policy against one type of driver."""
+) -> tuple[float, bool]:
+    """Cost of one policy against one type of driver, and whether the two come closer than `pad`."""
     limit = law.speed_limit
     goal = max(host_station, 0.0) + host.goal
     closest = 1e9
@@ -102,7 +101,7 @@ def rollout(
     change = host.change * host.step
     for _ in range(host.steps):
         wanted = host_acceleration(policy, held, host_station, host_speed, station, speed, length, host, limit)
-        if acceleration < 1e8 and policy != SUDDEN:
+        if policy != SUDDEN and acceleration == acceleration:  # not NaN: there is a command before
             wanted = min(max(wanted, acceleration - change), acceleration + change)
         acceleration = wanted
         driver = 0.0
@@ -132,55 +131,84 @@ def rollout(
         reached = time + (sqrt(host_speed * host_speed + 2.0 * pull * (goal - host_station)) - host_speed) / pull
     cost = host.progress * reached + host.effort * effort + host.closeness * exp(-max(closest, 0.0) / host.gap_scale)
     if closest < host.pad:
-        cost += host.overlap
-    return cost
+        return cost + host.overlap, True
+    return cost, False
 
 
 @njit(cache=True)
 def choose(
     state: FloatArray,
+    plans: BoolArray,
     belief: FloatArray,
     margins: FloatArray,
     delays: FloatArray,
-    policies: FloatArray,
+    kinds: IntArray,
     held: FloatArray,
     last: FloatArray,
-    planned: FloatArray,
     least: float,
     commitment: float,
     host: HostLaw,
     law: DriverLaw,
     costs: FloatArray,
     chosen: IntArray,
+    risk: FloatArray,
     wanted: FloatArray,
 ) -> None:
-    """Fill `costs` (n, policies, types), `chosen` and `wanted` (n,) where `planned` >= 0.
+    """Choose a policy for each encounter that `plans`, and what it wants now.
 
-    Types below the belief `least` are left out (cost 0).
+    Args:
+        state: The rows of an `Observation`, shape (6, n).
+        plans: Encounters whose merging car is not yet in the lane, shape (n,).
+        belief: Belief in each type of driver, shape (n, types); types with less than `least` are left out, at cost 0.
+        margins: The driver's margin under each type [s], shape (n, types).
+        delays: Time before the driver acts [s], shape (n,).
+        kinds: What each policy is, shape (policies,).
+        held: The acceleration of those that hold one [m/s^2], shape (policies,).
+        last: The host's last command [m/s^2], NaN without one, shape (n,).
+        least: Least belief.
+        commitment: How much cheaper a policy must be to replace the chosen one.
+        host: Constants of the host and of the costs.
+        law: Constants of the drivers.
+        costs: To be filled, shape (n, policies, types).
+        chosen: Policy of the cycle before, -1 without one; to be changed, shape (n,).
+        risk: Belief in types that the chosen policy comes too close to; to be filled, shape (n,).
+        wanted: Acceleration that the chosen policy wants [m/s^2]; to be filled, shape (n,).
     """
     for row in range(state.shape[1]):
-        if planned[row] < 0:
+        if not plans[row]:
             continue
         h, v, s, u, length_h, length_m = state[:, row]
-        best, best_cost, kept_cost = -1, 0.0, 0.0
-        for policy in range(policies.shape[0]):
-            expected = 0.0
+        best, best_cost, kept_cost, best_risk = -1, 0.0, 0.0, 0.0
+        for policy in range(kinds.shape[0]):
+            expected, danger = 0.0, 0.0
             for kind in range(belief.shape[1]):
-                cost = 0.0
+                costs[row, policy, kind] = 0.0
                 if belief[row, kind] >= least:
-                    cost = rollout(
-                        int(policies[policy]), held[policy], kind, margins[row, kind], delays[row], h, v, length_h, s, u, length_m,
-                        last[row], host, law,
+                    cost, overlaps = rollout(
+                        kinds[policy],
+                        held[policy],
+                        kind,
+                        margins[row, kind],
+                        delays[row],
+                        h,
+                        v,
+                        length_h,
+                        s,
+                        u,
+                        length_m,
+                        last[row],
+                        host,
+                        law,
                     )
-                costs[row, policy, kind] = cost
-                expected += belief[row, kind] * cost
+                    costs[row, policy, kind] = cost
+                    expected += belief[row, kind] * cost
+                    if overlaps:
+                        danger += belief[row, kind]
             if best < 0 or expected < best_cost:
-                best, best_cost = policy, expected
+                best, best_cost, best_risk = policy, expected, danger
             if policy == chosen[row]:
-                kept_cost = expected
+                kept_cost, risk[row] = expected, danger
         if chosen[row] < 0 or best_cost < kept_cost - commitment:
-            chosen[row] = best
+            chosen[row], risk[row] = best, best_risk
         policy = chosen[row]
-        wanted[row] = host_acceleration(
-            int(policies[policy]), held[policy], h, v, s, u, length_m, host, law.speed_limit
-        )
+        wanted[row] = host_acceleration(kinds[policy], held[policy], h, v, s, u, length_m, host, law.speed_limit)

@@ -19,8 +19,7 @@ class DriverLaw(NamedTuple):
     min_acceleration: float
     max_acceleration: float
     critical_gap: float
-    comfortable_braking: float
-    start_acceleration: float
+    waiting_braking: float
     k_free: float
     k_gap: float
     k_speed: float
@@ -55,10 +54,10 @@ def planned(kind: int, margin: float, host_arrival: float, station: float, speed
     elif kind == IGNORE:
         wanted = 0.0
     elif host_arrival - arrival(station, speed) >= law.critical_gap:
-        wanted = min(law.start_acceleration, law.k_free * (law.speed_limit - speed))
+        wanted = law.k_free * (law.speed_limit - speed)
     else:
         stop = -speed * speed / (2.0 * way)
-        wanted = stop if stop <= -law.comfortable_braking else 0.0
+        wanted = stop if stop <= -law.waiting_braking else 0.0
     return min(max(wanted, law.min_acceleration), law.max_acceleration)
 
 

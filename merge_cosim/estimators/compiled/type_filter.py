@@ -86,8 +86,14 @@ def update(
             mean_margins[row, kinds[one]] += both * margins[one]
             unreacted[row] += weight[row, 0, one]
             expected[row, one] = reacting(
-                kinds[one], margins[one], host_station[row], host_speed[row], host_length[row],
-                station[row], speed[row], law,
+                kinds[one],
+                margins[one],
+                host_station[row],
+                host_speed[row],
+                host_length[row],
+                station[row],
+                speed[row],
+                law,
             )
         for kind in range(beliefs.shape[1]):
             mean_margins[row, kind] /= max(beliefs[row, kind], 1e-300)
@@ -97,4 +103,3 @@ def update(
         not_yield = beliefs[row, NOT_YIELD] + (beliefs[row, IGNORE] if first else 0.0)
         not_yield = min(max(not_yield, 1e-6), 1.0 - 1e-6)
         log_odds[row] = log(not_yield / (1.0 - not_yield))
-
