@@ -43,20 +43,27 @@ _ESCAPE_TIME = 20.0
 @controllers.register
 @dataclass(kw_only=True)
 class Rollout(ReactingDriver, Acc):
-    """Expected cost of closed-loop policies over types of drivers who react, with commitment and an escape.
+    """Expected cost of closed-loop policies over types of drivers that react, with commitment and an escape.
 
     Each cycle, each policy of `POLICIES` is driven for `steps * step` seconds against each type of driver
-    (`ReactingDriver`), who plans anew in every step where the rolled-out host is. The policy with the least expected
-    cost `J(pi) = sum_D b(D) [overlap 1{gap < pad} + closeness exp(-gap / gap_scale) + progress t_goal +
-    effort int a_brake^2 dt]` is driven; `gap` is the smallest with both cars past the merging point, `t_goal` the time
-    at which the host is `goal` past it. The policy of the last cycle is kept unless another is better by `commitment`.
-    The command changes by at most `max_jerk * dt` a cycle.
+    (`ReactingDriver`), which plans anew in every step for where the rolled-out host is. The policy with the least
+    expected cost
 
-    Then a constraint: where an escape exists (full braking or full acceleration that avoids an overlap whatever a
-    driver within stated bounds does), the command is the nearest one that leaves an escape for the next cycle.
+    `J(pi) = sum_D b(D) [overlap P(overlap) + progress t_goal + effort int a_brake^2 dt + sudden]`
 
-    Once the merging car is in the lane the law of acc drives. Beliefs are those of an estimator that has them
-    (`beliefs`); of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left
+    is driven, the last term for the two policies without a bound on the jerk; `t_goal` is the time at which the host is
+    `goal` past the merging point (or past where it is, if beyond).
+    `P(overlap) = max_t Phi(-gap(t) / (spread + spread_rate t))` over the steps with both cars past the merging point,
+    by the logistic function, for a gap predicted further ahead is less sure. The policy of the cycle before is kept
+    unless another is cheaper by `commitment`. The command changes by at most `max_jerk * dt` a cycle, but for the two
+    hardest policies and for escapes.
+
+    Where the chosen policy's overlap has the probability `tolerated_risk` or more, and an escape exists (full braking
+    or full acceleration that avoids an overlap whatever a driver within stated bounds does), the command is the nearest
+    one that leaves an escape for the next cycle. With `tolerated_risk=0` an escape that exists is never given up.
+
+    Once the merging car is in the lane the law of acc drives. Beliefs, margins and reaction are those of the estimator
+    `interactive`. Of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left
     to `yield`, or to `wait` where the merging car is slower than `standing`.
 
     Attributes:
@@ -65,16 +72,16 @@ class Rollout(ReactingDriver, Acc):
         step: Length of a step [s].
         goal: Way past the merging point at which progress is measured [m].
         scored: Time during which gaps count from when both cars have reached the merging point [s].
-        overlap: Cost of an overlap.
-        pad: Gap below which cars count as overlapping [m].
-        closeness: Cost of closeness.
-        gap_scale: Gap at which closeness has fallen to 1/e [m].
-        progress: Cost of time [1/s].
+        overlap: Cost of an overlap [s].
+        spread: Standard deviation of a predicted gap at once [m].
+        spread_rate: What it grows by [m/s].
+        progress: Cost of a second.
         effort: Cost of braking [s^3/m^2].
-        commitment: How much better another policy must be.
+        sudden: Cost of a policy without a bound on the jerk [s].
+        commitment: How much cheaper another policy must be to be taken.
         max_jerk: Largest change of the command but for an escape [m/s^3].
         escape: Keep an escape.
-        tolerated_risk: Least belief in drivers that the plan overlaps with for which an escape is kept; 0: always kept.
+        tolerated_risk: Least probability of an overlap for which an escape is kept; 0: always.
         escape_braking: A driver's hardest braking as the escape allows for [m/s^2].
         escape_acceleration: A driver's hardest acceleration as the escape allows for [m/s^2].
         follower_braking: Braking that a driver behind the host is sure to have [m/s^2].
@@ -92,15 +99,15 @@ class Rollout(ReactingDriver, Acc):
     goal: PositiveFloat = 50.0
     scored: PositiveFloat = 3.0
     overlap: NonNegativeFloat = 20.0
-    pad: NonNegativeFloat = 1.0
-    closeness: NonNegativeFloat = 3.0
-    gap_scale: PositiveFloat = 3.0
+    spread: PositiveFloat = 0.5
+    spread_rate: NonNegativeFloat = 0.5
     progress: NonNegativeFloat = 1.0
     effort: NonNegativeFloat = 0.1
+    sudden: NonNegativeFloat = 0.1
     commitment: NonNegativeFloat = 0.2
     max_jerk: PositiveFloat = 3.0
     escape: bool = True
-    tolerated_risk: Share = 0.0
+    tolerated_risk: Share = 0.3
     escape_braking: NonNegativeFloat = 4.0
     escape_acceleration: Acceleration = 3.0
     follower_braking: PositiveFloat = 3.0
@@ -146,11 +153,11 @@ class Rollout(ReactingDriver, Acc):
             self.goal,
             self.scored,
             self.overlap,
-            self.pad,
-            self.closeness,
-            self.gap_scale,
+            self.spread,
+            self.spread_rate,
             self.progress,
             self.effort,
+            self.sudden,
         )
         self._bounds = Bounds(
             self.min_acceleration,

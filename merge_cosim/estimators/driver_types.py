@@ -43,7 +43,7 @@ class ReactingDriver:
     driver_margin: NonNegativeFloat = 1.2
     driver_min_acceleration: Braking = -4.0
     driver_max_acceleration: Acceleration = 3.0
-    critical_gap: NonNegativeFloat = 2.0
+    critical_gap: NonNegativeFloat = 3.0
     waiting_braking: PositiveFloat = 1.5
     driver_headway: NonNegativeFloat = 0.8
     driver_d0: NonNegativeFloat = 2.0

@@ -18,7 +18,18 @@ from merge_cosim.estimators.driver_types import DRIVER_TYPES, ReactingDriver
 @estimators.register
 @dataclass(kw_only=True)
 class Interactive(ReactingDriver, Estimator):
-    """Exact filter over the types of `ReactingDriver`, each with some margins, before and after a reaction time.
+    """Exact filter over types of drivers (`ReactingDriver`) that react to the host, each before and after its reaction.
+
+    The hypotheses are `yield` and `not_yield` with three margins from `min_margin` to `max_margin` each, `ignore` and
+    `wait`. Each plans an acceleration `a_D` from the state of the cycle before, within what the speed limit leaves;
+    before its reaction a driver keeps its speed. With `n = (V_t - V_{t-1}) / dt - a_D`, first-order noise of standard
+    deviation `sigma` and time constant `correlation_time`, `rho = exp(-dt / correlation_time)`:
+
+    `P(a | D) = (1 - outlier) N(n_t; rho n_{t-1}, sigma^2 (1 - rho^2) + white^2) + outlier / 10`.
+
+    So a steady difference, which the noise explains, weighs little, and a sudden one much. A driver begins to act at
+    the rate `1 / reaction_time`, and draws its type anew at `change_rate`.
+    `P(N) = b(not_yield) + b(ignore) [T_m < T_h]`.
 
     Attributes:
         sigma: Standard deviation of the acceleration around what a type plans [m/s^2].
@@ -28,7 +39,7 @@ class Interactive(ReactingDriver, Estimator):
         reaction_time: Mean time before a driver first acts [s].
         change_rate: Rate at which a driver changes the type [1/s].
         start_yield, start_not_yield, start_ignore: Shares of the types at the start; the rest waits.
-        min_margin, max_margin: Margins range between these [s].
+        min_margin, max_margin: The margins range between these [s].
     """
 
     name: ClassVar[str] = "interactive"

@@ -10,6 +10,8 @@ from merge_cosim.estimators.compiled.drivers import TOL, DriverLaw, arrival, nee
 
 FREE, COAST, FOLLOW, BEHIND, FIXED, SUDDEN = 0, 1, 2, 3, 4, 5
 """Policies; FIXED and SUDDEN hold an acceleration, SUDDEN with no bound on the change."""
+LOGISTIC = 1.702
+"""Slope of the logistic function that is closest to the normal distribution."""
 
 
 class HostLaw(NamedTuple):
@@ -29,11 +31,11 @@ class HostLaw(NamedTuple):
     goal: float
     scored: float
     overlap: float
-    pad: float
-    closeness: float
-    gap_scale: float
+    spread: float
+    spread_rate: float
     progress: float
     effort: float
+    sudden: float
 
 
 @njit(cache=True)
@@ -88,11 +90,11 @@ def rollout(
     last: float,
     host: HostLaw,
     law: DriverLaw,
-) -> tuple[float, bool]:
-    """Cost of one policy against one type of driver, and whether the two come closer than `pad`."""
+) -> tuple[float, float]:
+    """Cost of one policy against one type of driver, and the probability of an overlap."""
     limit = law.speed_limit
     goal = max(host_station, 0.0) + host.goal
-    closest = 1e9
+    surest = 1e9
     effort = 0.0
     acceleration = last
     reached = -1.0
@@ -117,22 +119,33 @@ def rollout(
         host_station += host_speed * host.step
         station += speed * host.step
         time += host.step
-        if min(host_station, station) >= -TOL:
-            both += 1
-            if station - host_station >= -TOL:
-                gap = station - length - host_station
-            else:
-                gap = host_station - host_length - station
-            closest = min(closest, gap)
-            if gap < -TOL or both * host.step >= host.scored:
-                break
+        if min(host_station, station) < -TOL:
+            continue
+        at, host_at, merging_at = time, host_station, station
+        if both < 0:  # the moment within the step at which the second of the two reaches the merging point
+            back = 0.0
+            if host_speed > 0.0:
+                back = host_station / host_speed
+            if speed > 0.0:
+                back = min(back, station / speed)
+            back = min(max(back, 0.0), host.step)
+            at, host_at, merging_at = time - back, host_station - back * host_speed, station - back * speed
+        both += 1
+        for _ in range(2):
+            ahead = merging_at - host_at >= -TOL
+            gap = merging_at - length - host_at if ahead else host_at - host_length - merging_at
+            surest = min(surest, gap / (host.spread + host.spread_rate * at))
+            at, host_at, merging_at = time, host_station, station
+        if gap < -TOL or both * host.step >= host.scored:
+            break
     if reached < 0.0:
         pull = min(max(0.5 * host.k_free * (limit - host_speed), 0.05), host.max_acceleration)
         reached = time + (sqrt(host_speed * host_speed + 2.0 * pull * (goal - host_station)) - host_speed) / pull
-    cost = host.progress * reached + host.effort * effort + host.closeness * exp(-max(closest, 0.0) / host.gap_scale)
-    if closest < host.pad:
-        return cost + host.overlap, True
-    return cost, False
+    cost = host.progress * reached + host.effort * effort
+    if policy == SUDDEN:
+        cost += host.sudden
+    probability = 1.0 / (1.0 + exp(min(max(LOGISTIC * surest, -50.0), 50.0)))
+    return cost + host.overlap * probability, probability
 
 
 @njit(cache=True)
@@ -171,7 +184,7 @@ def choose(
         law: Constants of the drivers.
         costs: To be filled, shape (n, policies, types).
         chosen: Policy of the cycle before, -1 without one; to be changed, shape (n,).
-        risk: Belief in types that the chosen policy comes too close to; to be filled, shape (n,).
+        risk: Probability of an overlap under the chosen policy; to be filled, shape (n,).
         wanted: Acceleration that the chosen policy wants [m/s^2]; to be filled, shape (n,).
     """
     for row in range(state.shape[1]):
@@ -202,8 +215,7 @@ def choose(
                     )
                     costs[row, policy, kind] = cost
                     expected += belief[row, kind] * cost
-                    if overlaps:
-                        danger += belief[row, kind]
+                    danger += belief[row, kind] * overlaps
             if best < 0 or expected < best_cost:
                 best, best_cost, best_risk = policy, expected, danger
             if policy == chosen[row]:

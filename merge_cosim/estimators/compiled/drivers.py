@@ -74,7 +74,7 @@ def reacting(
 ) -> float:
     """Acceleration [m/s^2] of a driver of a type: its plan, and once a car has passed, distance keeping.
 
-    A driver that ignores the host holds the speed throughout.
+    A driver that ignores the host holds the speed throughout; one that waits lets the host's rear pass.
     """
     if kind == IGNORE:
         return 0.0
@@ -82,6 +82,8 @@ def reacting(
         return planned(kind, margin, arrival(host_station, host_speed), station, speed, law)
     wanted = law.k_free * (law.speed_limit - speed)
     lead = host_station - station
+    if kind == WAIT and station < -TOL and -TOL < lead < host_length + law.d0:
+        return max(-speed * speed / (2.0 * max(-station, NEAR)), law.min_acceleration)
     if lead > TOL:
         gap = lead - host_length - law.d0 - law.headway * speed
         wanted = min(wanted, law.k_gap * gap + law.k_speed * (host_speed - speed))

@@ -85,7 +85,7 @@ def update(
             beliefs[row, kinds[one]] += both
             mean_margins[row, kinds[one]] += both * margins[one]
             unreacted[row] += weight[row, 0, one]
-            expected[row, one] = reacting(
+            planned = reacting(
                 kinds[one],
                 margins[one],
                 host_station[row],
@@ -95,6 +95,8 @@ def update(
                 speed[row],
                 law,
             )
+            planned = min(planned, max((law.speed_limit - speed[row]) / law.dt, 0.0))
+            expected[row, one] = max(planned, min(-speed[row] / law.dt, 0.0))
         for kind in range(beliefs.shape[1]):
             mean_margins[row, kind] /= max(beliefs[row, kind], 1e-300)
         last_speed[row] = speed[row]

@@ -1,0 +1,186 @@
+"""The rollout planner: costs against numpy, policies by hand, commitment, bounded jerk, and escapes that hold."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rollout_reference import costs
+
+from merge_cosim.controllers.compiled.escapes import FORCED, LEFT, NONE, Bounds, escapes, kept
+from merge_cosim.controllers.rollout import POLICIES, Rollout
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.estimators.acc import AccMerging
+from merge_cosim.estimators.interactive import Interactive
+from merge_cosim.simulation.host_driver import HostDriver
+
+LIMIT = 29.0
+BOUNDS = Bounds(-4.0, 2.0, 4.0, 3.0, 3.0, 0.3, LIMIT, 0.1, 200)
+
+
+def states(n, seed=0):
+    rng = np.random.default_rng(seed)
+    station, speed = rng.uniform(-100, -1, (2, n)), rng.uniform(0, 28, (2, n))
+    return Observation(station[0], speed[0], station[1], speed[1], rng.uniform(4, 8, n), rng.uniform(4, 8, n))
+
+
+def one(host, host_speed, merging, merging_speed):
+    return Observation(*(np.array([float(v)]) for v in (host, host_speed, merging, merging_speed, 5, 5)))
+
+
+def planner(n=1, **values):
+    made = Rollout(**values)
+    made.start(n, Setting(LIMIT))
+    made.reset(np.arange(n))
+    return made
+
+
+def test_costs_are_those_of_numpy():
+    n = 300
+    seen = states(n)
+    made = planner(n, least_belief=0.0, escape=False)
+    log_odds = np.linspace(-3, 3, n)
+    margins = np.full((n, 4), made.driver_margin)
+    for last in (np.full(n, np.nan), made.command(seen, log_odds, log_odds >= 0)):
+        made._last = last.copy()
+        made.command(seen, log_odds, log_odds >= 0)
+        expected = costs(seen, margins, np.zeros(n), last, made, LIMIT)
+        np.testing.assert_allclose(made.last_costs, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_a_host_far_ahead_drives_freely_and_one_far_behind_too():
+    assert planner().command(one(-40, 20, -120, 15), np.zeros(1), np.ones(1, bool))[0] == 2.0
+    assert planner().command(one(-120, 15, -20, 20), np.zeros(1), np.ones(1, bool))[0] == 2.0
+
+
+def test_progress_is_the_time_to_the_goal():
+    made = planner(least_belief=0.0)
+    made.command(one(-50, LIMIT, -500, 0), np.zeros(1), np.ones(1, bool))
+    np.testing.assert_allclose(made.last_costs[0, POLICIES.index("coast")], 100 / LIMIT)
+    braking = made.last_costs[0, POLICIES.index("brake 1"), 0]
+    assert braking > 100 / LIMIT + 0.1 * 4
+
+
+def test_a_host_does_not_wait_for_a_driver_that_waits_for_it():
+    made = planner()
+    seen = one(-20, 10, -0.1, 0.0)
+    made.command(seen, np.full(1, -2.0), np.zeros(1, bool))
+    assert made.last_belief[0, 3] > 0.6
+    go, stay = (made.last_costs[0, POLICIES.index(name), 3] for name in ("free", "brake 4"))
+    assert go < stay - 1.0
+    assert POLICIES[made.last_policy[0]] in ("free", "accelerate 1", "accelerate 2")
+
+
+def test_slowing_down_for_a_driver_that_yields_slows_the_driver():
+    made = planner(least_belief=0.0)
+    made.command(one(-60, 18, -58, 17), np.zeros(1), np.ones(1, bool))
+    by_type = made.last_costs[0]
+    assert by_type[POLICIES.index("brake 2"), 0] > by_type[POLICIES.index("free"), 0] + 1.0
+    assert by_type[POLICIES.index("free"), 1] > by_type[POLICIES.index("follow"), 1]
+
+
+def test_commitment_keeps_the_policy_until_another_is_cheaper_by_that_much():
+    seen, odds, target = one(-60, 18, -58, 17), np.zeros(1), np.ones(1, bool)
+    for commitment, keeps in ((0.0, False), (1e6, True)):
+        made = planner(commitment=commitment)
+        made.last_policy[:] = POLICIES.index("brake 4")
+        made.command(seen, odds, target)
+        assert (made.last_policy[0] == POLICIES.index("brake 4")) == keeps
+
+
+def test_jerk_is_bounded_but_for_the_two_hardest_policies():
+    made = planner(escape=False, max_jerk=2.0, sudden=10.0)
+    made._last[:] = -1.0
+    assert made.command(one(-40, 10, -120, 5), np.zeros(1), np.ones(1, bool))[0] == pytest.approx(-0.8)
+    made._last[:], made.last_policy[:], made.commitment = -1.0, POLICIES.index("brake 4"), 1e6
+    assert made.command(one(-40, 10, -120, 5), np.zeros(1), np.ones(1, bool))[0] == -4.0
+
+
+def test_beliefs_are_the_filters_and_of_others_the_stated_shares():
+    seen = one(-60, 18, -58, 17)
+    driver = HostDriver(Interactive(), Rollout())
+    driver.start(1, Setting(LIMIT))
+    driver.reset(np.arange(1), np.zeros(1, np.int64), np.zeros(1, np.uint64))
+    driver.decide(seen)
+    np.testing.assert_array_equal(driver.controller.last_belief, driver.estimator.beliefs)
+    other = HostDriver(AccMerging(), Rollout(ignore_share=0.2))
+    other.start(1, Setting(LIMIT))
+    other.decide(seen)
+    np.testing.assert_allclose(other.controller.last_belief, [[0.0, 0.8, 0.2, 0.0]])
+
+
+def test_after_the_merge_the_law_of_acc_drives():
+    from merge_cosim.controllers.acc import Acc as Law
+
+    seen, law = one(-10, 20, 5, 15), Law()
+    law.start(1, Setting(LIMIT))
+    target = np.ones(1, bool)
+    np.testing.assert_array_equal(
+        planner(escape=False).command(seen, np.zeros(1), target), law.command(seen, np.zeros(1), target)
+    )
+
+
+@pytest.mark.parametrize(
+    ("state", "then", "holds"),
+    [
+        ((-60, 20, 5, -60, 20, 5), -4.0, True),  # stops after 50 m
+        ((-45, 20, 5, -45, 20, 5), -4.0, False),  # cannot stop, and the driver may be anywhere
+        ((-10, 20, 5, -80, 20, 5), 2.0, True),  # through before the driver comes
+        ((-10, 20, 5, -14, 20, 5), 2.0, False),  # the driver can be beside
+        ((-30, 20, 5, -1, 28, 5), -4.0, True),  # ahead, and faster than the host whatever it does
+    ],
+)
+def test_escapes_by_hand(state, then, holds):
+    assert escapes(then, then, *map(float, state), BOUNDS) == holds
+
+
+stations, speeds = st.floats(-90, -1), st.floats(0, 28)
+accelerations = st.lists(st.floats(-4, 3), min_size=30, max_size=30)
+
+
+@settings(max_examples=150, deadline=None)
+@given(stations, speeds, stations, speeds, accelerations)
+def test_an_escape_once_kept_is_kept_whatever_the_driver_does(s_h, v_h, s_m, v_m, driven):
+    made = planner(tolerated_risk=0.0)
+    kept_before = False
+    for a in driven:
+        seen = one(s_h, v_h, s_m, v_m)
+        if s_m >= 0 or s_h >= -0.2:
+            break
+        command = made.command(seen, np.zeros(1), np.zeros(1, bool))[0]
+        status = made.escape_status[0]
+        assert status in (NONE, LEFT, FORCED)
+        assert not (kept_before and status == NONE)
+        kept_before = status != NONE
+        if kept_before:
+            assert kept(command, s_h, v_h, 5.0, s_m, v_m, 5.0, BOUNDS)
+        v_h = max(v_h + command * 0.1, 0.0)
+        v_m = min(max(v_m + a * 0.1, 0.0), LIMIT)
+        s_h, s_m = s_h + v_h * 0.1, s_m + v_m * 0.1
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.floats(-90, -1),
+    st.floats(0, 28),
+    st.floats(-90, -1),
+    st.floats(0, 28),
+    st.sampled_from([-4.0, 2.0]),
+    accelerations,
+)
+def test_an_escape_avoids_the_overlap_whatever_the_driver_does(s_h, v_h, s_m, v_m, then, driven):
+    if not escapes(then, then, s_h, v_h, 5.0, s_m, v_m, 5.0, BOUNDS):
+        return
+    passed = 0.0
+    for k in range(100):
+        a = driven[k % 30]
+        if s_h >= -0.1:
+            passed += 0.1
+            if s_m < s_h and passed > 0.3 and v_m > 0:
+                a = -3.0
+        v_h, v_m = min(max(v_h + then * 0.1, 0.0), LIMIT), min(max(v_m + a * 0.1, 0.0), LIMIT)
+        s_h, s_m = s_h + v_h * 0.1, s_m + v_m * 0.1
+        if min(s_h, s_m) >= -1e-6:
+            gap = s_m - 5.0 - s_h if s_m >= s_h else s_h - 5.0 - s_m
+            assert gap >= -1e-6
+        if passed > 0.3 and s_m < s_h and v_m <= v_h and then > 0:
+            break  # the driver may accelerate again, but then it is the one behind that closes the gap

@@ -1,0 +1,94 @@
+"""The interactive filter: what each type plans by hand, and what the filter believes of drivers of known types."""
+
+import numpy as np
+import pytest
+
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.estimators.compiled.drivers import IGNORE, NOT_YIELD, WAIT, YIELD, planned, reacting
+from merge_cosim.estimators.driver_types import DRIVER_TYPES
+from merge_cosim.estimators.interactive import Interactive
+
+LAW = Interactive().law(Setting(29.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "arrival", "station", "speed", "expected"),
+    [
+        (YIELD, 3.0, -60.0, 20.0, 2 * (60 - 20 * 4) / 16),  # a second after the host
+        (YIELD, 1.0, -60.0, 20.0, 0.0),  # late enough as it is
+        (YIELD, 9.0, -20.0, 20.0, -4.0),  # the stop at the point is harder than the bound
+        (YIELD, 9.0, -80.0, 20.0, -2.5),  # the stop at the point
+        (NOT_YIELD, 3.0, -60.0, 20.0, 2 * (60 - 20 * 2) / 4 if 2 * (60 - 20 * 2) / 4 < 3 else 3.0),
+        (NOT_YIELD, 5.0, -80.0, 19.0, 2 * (80 - 19 * 4) / 16),
+        (NOT_YIELD, 9.0, -60.0, 20.0, 0.0),
+        (IGNORE, 3.0, -60.0, 20.0, 0.0),
+        (WAIT, 9.0, -60.0, 28.0, 0.4),  # a gap: free driving
+        (WAIT, 3.0, -60.0, 20.0, -400 / 120),  # no gap: the stop at the point
+        (WAIT, 9.0, -600.0, 20.0, 0.0),  # far from it
+    ],
+)
+def test_what_a_driver_plans(kind, arrival, station, speed, expected):
+    assert planned(kind, 1.0, arrival, station, speed, LAW) == pytest.approx(expected)
+
+
+def test_after_the_host_has_passed_drivers_follow_but_for_those_that_ignore_it():
+    follows = 0.23 * (20 - 5 - 2 - 0.8 * 20) + 0.6 * (18 - 20)
+    for kind in (YIELD, NOT_YIELD, WAIT):
+        assert reacting(kind, 1.0, 5.0, 18.0, 5.0, -15.0, 20.0, LAW) == pytest.approx(follows)
+    assert reacting(IGNORE, 1.0, 5.0, 18.0, 5.0, -15.0, 20.0, LAW) == 0.0
+
+
+def believed(kind, cycles=40, reaction=5, noise=0.0, host_speed=18.0):
+    """Beliefs after some cycles of a driver of a type with a margin of 1.4 s."""
+    estimator = Interactive()
+    estimator.start(1, Setting(29.0))
+    rng = np.random.default_rng(0)
+    host, station, speed = -90.0, -85.0, 17.0
+    for k in range(cycles):
+        seen = Observation(*(np.array([v]) for v in (host, host_speed, station, speed, 5.0, 5.0)))
+        log_odds = estimator.update(seen)
+        a = reacting(kind, 1.4, host, host_speed, 5.0, station, speed, LAW) if k >= reaction else 0.0
+        speed = min(max(speed + (a + noise * rng.normal()) * 0.1, 0.0), 29.0)
+        host, station = host + host_speed * 0.1, station + speed * 0.1
+    return estimator.beliefs[0], log_odds[0]
+
+
+@pytest.mark.parametrize("kind", [YIELD, NOT_YIELD])
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_a_driver_is_recognised(kind, noise):
+    belief, log_odds = believed(kind, noise=noise)
+    assert belief.sum() == pytest.approx(1.0)
+    assert belief[kind] > 0.9
+    assert (log_odds > 2.0) == (kind == NOT_YIELD)
+
+
+def test_a_driver_that_keeps_its_speed_is_believed_to_ignore():
+    belief, _ = believed(IGNORE)
+    assert belief.argmax() == IGNORE
+
+
+def test_before_anything_is_seen_the_belief_is_the_prior():
+    estimator = Interactive(start_yield=0.5, start_not_yield=0.2, start_ignore=0.2)
+    estimator.start(1, Setting(29.0))
+    estimator.update(Observation(*(np.array([v]) for v in (-90.0, 18.0, -85.0, 17.0, 5.0, 5.0))))
+    np.testing.assert_allclose(estimator.beliefs, [[0.5, 0.2, 0.2, 0.1]])
+    assert len(DRIVER_TYPES) == estimator.beliefs.shape[1]
+    assert estimator.unreacted[0] == pytest.approx(1.0)
+
+
+def test_one_update_by_hand():
+    """Two types only, no reaction time, no change: Bayes' rule on one acceleration."""
+    estimator = Interactive(
+        start_yield=0.5, start_not_yield=0.5, start_ignore=0.0, reaction_time=0.0, change_rate=0.0, outlier=0.0,
+        min_margin=1.0, max_margin=1.0,
+    )  # fmt: skip
+    estimator.start(1, Setting(29.0))
+    first = Observation(*(np.array([v]) for v in (-60.0, 20.0, -60.0, 20.0, 5.0, 5.0)))
+    estimator.update(first)
+    then = Observation(*(np.array([v]) for v in (-58.0, 20.0, -58.0, 19.9, 5.0, 5.0)))
+    log_odds = estimator.update(then)[0]
+    keep = np.exp(-0.1)
+    variance = 0.3**2 + 0.3**2 * (1 - keep**2) + 0.1**2
+    a_yield, a_not_yield = 2 * (60 - 20 * 4) / 16, 3.0
+    expected = ((-1.0 - a_yield) ** 2 - (-1.0 - a_not_yield) ** 2) / (2 * variance)
+    assert log_odds == pytest.approx(np.clip(expected, -np.log(1e6 - 1), np.log(1e6 - 1)))
