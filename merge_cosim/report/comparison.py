@@ -12,7 +12,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order
-from merge_cosim.results.statistics.comparison import mcnemar
+from merge_cosim.results.statistics.paired import sign_flip_p
 from merge_cosim.results.statistics.summary import is_sample
 from merge_cosim.results.store import MANIFEST, ResultFolder
 from merge_cosim.scenarios.methods import is_reference
@@ -92,7 +92,8 @@ def _row(part: pd.DataFrame) -> dict[str, Any]:
     means = {f"{name}_{side}": part[f"{name}_{side}"].mean() for name in MEASURES for side in "ab"}
     means |= {f"{name}_difference": (part[f"{name}_a"] - part[f"{name}_b"]).mean() for name in MEASURES}
     rates = {f"failure_pct_{side}": 100 * f.mean() if len(f) else np.nan for side, f in zip("ab", failed, strict=True)}
-    p = mcnemar(only_a, only_b) if is_sample(part) else None
+    clusters = scored["car_a"].where(scored["car_a"] != "", scored["case"])
+    p = sign_flip_p(failed[0].astype(int) - failed[1].astype(int), clusters.to_numpy()) if is_sample(part) else None
     return {"n": len(scored), **rates, "only_a": only_a, "only_b": only_b, "p": p, **means}
 
 

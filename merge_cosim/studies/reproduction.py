@@ -10,12 +10,16 @@ from merge_cosim.ngsim.pairing.encounters import site_encounters
 from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.simulation.worlds.base import WorldKind
-from merge_cosim.studies.training import train
+from merge_cosim.studies.training import train, train_ensemble
 from merge_cosim.sweeps.sweep import SweepRequest, sweep
 
 NODES = (1, 2, 4, 8, 13, 20, 26, 32, 39, 45, 52, 59, 66, 73, 80, 90, 100, 110, 120)
 """Numbers of speed nodes that are tried (Dong, Dolan, Litkouhi 2017, failure rate by number of nodes)."""
-DESIGNED, PAIRS, NODE_SWEEP = "designed", "pairs", "nodes"
+DESIGNED, PAIRS, NODE_SWEEP, MODEL_SWEEP = "designed", "pairs", "nodes", "models-swept"
+SPLITS = 10
+"""Models of the ensemble, each trained on another third of the merging cars."""
+LEARNED = ("pgm", "pgm-symmetric", "pgm-g", "fg", "fg-gmm", "ipcb")
+"""Methods that are run with each model of the ensemble, in Designed Test II."""
 MODELS = "models"
 """Folder of the models that are trained on the way."""
 
@@ -28,7 +32,8 @@ class Study:
     """One sweep of the reproduction.
 
     Attributes:
-        kind: `designed` (no data), `pairs` (all tests that start from pairs) or `nodes` (number of speed nodes).
+        kind: `designed` (no data), `pairs` (all tests that start from pairs), `nodes` (number of speed nodes) or
+            `models-swept` (Designed Test II with each model of an ensemble, in the closed form).
         source: Where its pairs come from; `designed` where there are none. Sources are never mixed.
         request: The sweep.
     """
@@ -91,6 +96,10 @@ def studies(
         varied = [("pgm.nodes", NODES)]
         nodes = replace(here, scenarios=("us101-replay",), methods=("pgm",), variations=varied)
         found.append(Study(NODE_SWEEP, source, nodes))
+        several = out / MODELS / f"{source}-splits"
+        train_ensemble("us101", data, source, seed, several, splits=SPLITS)
+        swept = replace(base, scenarios=("designed-2",), methods=LEARNED, model=str(several), world="closed-form")
+        found.append(Study(MODEL_SWEEP, source, swept))
     return found
 
 

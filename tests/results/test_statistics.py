@@ -12,7 +12,8 @@ from test_summaries import frame
 from merge_cosim.core.errors import UserError
 from merge_cosim.results.statistics import belief, calibration, strata, summarise
 from merge_cosim.results.statistics.belief import scores
-from merge_cosim.results.statistics.comparison import mcnemar, reference_of
+from merge_cosim.results.statistics.comparison import reference_of
+from merge_cosim.results.statistics.paired import mean_difference, sign_flip_p
 from merge_cosim.results.statistics.rates import bootstrap_means, wilson
 
 
@@ -25,17 +26,42 @@ def test_wilson_against_its_formula():
     assert wilson(0, 0) == (None, None)
 
 
-def test_mcnemar_is_the_exact_binomial_test():
-    assert mcnemar(6, 16) == pytest.approx(0.0525, abs=5e-5)  # sum of binomials of 22 up to 6, doubled
-    assert mcnemar(0, 5) == pytest.approx(2 * 0.5**5)
-    assert mcnemar(3, 3) == 1.0
-    assert mcnemar(0, 0) == 1.0
+def discordant(one, other, agreeing=5):
+    return np.array([1.0] * one + [-1.0] * other + [0.0] * agreeing)
+
+
+def p_of(one, other):
+    differences = discordant(one, other)
+    return sign_flip_p(differences, np.arange(len(differences)))
+
+
+def test_without_clusters_it_is_mcnemars_exact_test():
+    assert p_of(6, 16) == pytest.approx(0.0525, abs=5e-5)  # sum of binomials of 22 up to 6, doubled
+    assert p_of(0, 5) == pytest.approx(2 * 0.5**5)
+    assert p_of(3, 3) == 1.0
+    assert p_of(0, 0) == 1.0
 
 
 @given(st.integers(0, 40), st.integers(0, 40))
-def test_mcnemar_does_not_care_who_is_who(one, other):
-    assert mcnemar(one, other) == mcnemar(other, one)
-    assert 0.0 < mcnemar(one, other) <= 1.0
+def test_the_paired_test_is_symmetric_in_the_two_methods(one, other):
+    assert p_of(one, other) == p_of(other, one)
+    assert 0.0 < p_of(one, other) <= 1.0
+
+
+def test_cases_of_one_car_are_kept_together():
+    differences = discordant(6, 0)
+    assert sign_flip_p(differences, np.arange(11)) == pytest.approx(2 / 2**6)
+    assert sign_flip_p(differences, np.array([0, 0, 0, 1, 1, 1, 2, 3, 4, 5, 6])) == pytest.approx(2 / 2**2)
+    # sums of 3, 2 and -1: 4 or more in absolute value for 4 of the 8 patterns of signs
+    assert sign_flip_p(np.array([1, 1, 1, 1, 1, -1.0]), np.array([0, 0, 0, 1, 1, 2])) == pytest.approx(4 / 8)
+    many = np.concatenate([np.full(10, 2.0), np.full(10, 1.0)])
+    assert sign_flip_p(np.repeat(many, 1), np.arange(20)) < 1e-3  # drawn, since there are many clusters
+
+
+def test_mean_difference_and_its_interval():
+    first, second = pd.Series([3.0, 4.0, np.nan, 5.0]), pd.Series([1.0, 2.0, 3.0, 3.0])
+    mean, (low, high) = mean_difference(first, second, pd.Series(["a", "a", "b", "c"]))
+    assert (mean, low, high) == (2.0, 2.0, 2.0)
 
 
 def test_discordant_cases_are_those_that_both_carry_to_the_end():

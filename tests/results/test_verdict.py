@@ -4,7 +4,8 @@ import pandas as pd
 import pytest
 from scipy.stats import fisher_exact
 
-from merge_cosim.results.statistics.verdict import holm, percent, verdict, verdicts
+from merge_cosim.results.statistics.paired import holm
+from merge_cosim.results.statistics.verdict import percent, verdict, verdicts
 
 
 def _summary(source="designed", /, **methods):
@@ -19,7 +20,7 @@ def _summary(source="designed", /, **methods):
 def _rows(source, /, **failing):
     """Result rows of 40 cases; by method the numbers of the cases that failed."""
     same = {"scenario": "s", "variation": "", "site": "x", "source": source, "model": ""}
-    same |= {"censored": False, "stuck": False}
+    same |= {"car": "", "censored": False, "stuck": False}
     return pd.DataFrame(
         [same | {"method": m, "case": f"{i}", "failed": i in bad} for m, bad in failing.items() for i in range(40)]
     )

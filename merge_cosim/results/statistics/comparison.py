@@ -1,4 +1,4 @@
-"""Two methods on the same cases: McNemar's exact test."""
+"""Two methods on the same cases: which of them fails alone, and a paired test."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pandas as pd
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
+from merge_cosim.results.statistics.paired import sign_flip_p
 
 DEFAULT = "pgm"
 """The method that all are compared with, if it was run and none is chosen."""
@@ -28,7 +29,8 @@ def reference_of(methods: Sequence[str], chosen: str | None) -> str | None:
 def compare(own: pd.DataFrame, other: pd.DataFrame, against: str | None, is_sample: bool) -> dict[str, Any]:
     """Compare the failures of two methods on the cases that both carry to the end.
 
-    McNemar's exact test: of the cases on which just one fails, it is a coin's toss which one does, if both are as safe.
+    The test is McNemar's exact test where the cases are independent; the cases of one merging car are kept together
+    (`sign_flip_p`).
 
     Args:
         own: Rows of one method, one per case.
@@ -40,14 +42,16 @@ def compare(own: pd.DataFrame, other: pd.DataFrame, against: str | None, is_samp
     if against is None or not len(other) or (own["method"] == against).all():
         return nothing
     pairs = own[~own["censored"]].merge(other[~other["censored"]], on="case", suffixes=("", "_other"))
-    this = int((pairs["failed"] & ~pairs["failed_other"]).sum())
-    that = int((~pairs["failed"] & pairs["failed_other"]).sum())
-    p = mcnemar(this, that) if is_sample else None
-    return {"against": against, "only_this_fails": this, "only_other_fails": that, "mcnemar_p": p}
+    difference = pairs["failed"].astype(int) - pairs["failed_other"].astype(int)
+    p = sign_flip_p(difference.to_numpy(), clusters_of(pairs).to_numpy()) if is_sample else None
+    return {
+        "against": against,
+        "only_this_fails": int((difference > 0).sum()),
+        "only_other_fails": int((difference < 0).sum()),
+        "mcnemar_p": p,
+    }
 
 
-def mcnemar(one: int, other: int) -> float:
-    """Two-sided p value of McNemar's exact test from the two discordant counts; 1 without any."""
-    from scipy.stats import binomtest
-
-    return float(binomtest(one, one + other, 0.5).pvalue) if one + other else 1.0
+def clusters_of(rows: pd.DataFrame) -> pd.Series:
+    """What rows belong together: those of one merging car; of cases that are not logged, each stands alone."""
+    return rows["car"].where(rows["car"] != "", rows["case"])

@@ -12,6 +12,7 @@ import pyarrow as pa
 
 from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics.comparison import compare
+from merge_cosim.results.statistics.paired import holm
 from merge_cosim.results.statistics.rates import bootstrap_means, count, mean, percent, quantile, wilson
 from merge_cosim.scenarios.methods import CONSTANT, ORACLE_BEST
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
@@ -103,7 +104,11 @@ def _summaries(
     for names, group in groups:
         key = tuple(map(str, names))
         found.append(_summary(dict(zip(GROUP, key, strict=True)), group, cycle_us) | compared[key])
-    return pd.DataFrame(found)
+    table = pd.DataFrame(found)
+    table["p_holm"] = np.nan
+    for _, section in table[table["mcnemar_p"].notna()].groupby(SECTION):
+        table.loc[section.index, "p_holm"] = holm(section["mcnemar_p"].tolist())
+    return table
 
 
 def is_sample(group: pd.DataFrame) -> bool:

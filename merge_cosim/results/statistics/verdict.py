@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from merge_cosim.results.statistics.comparison import mcnemar
+from merge_cosim.results.statistics.comparison import clusters_of
+from merge_cosim.results.statistics.paired import holm, sign_flip_p
 from merge_cosim.results.statistics.summary import SECTION, is_sample
 from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
@@ -141,15 +142,6 @@ def percent(value: float) -> str:
     return f"{value:.2f} %" if 0.0 < value < 0.1 else f"{value:.1f} %"
 
 
-def holm(p_values: Sequence[float]) -> list[float]:
-    """Holm's correction of p values for their number, in their order."""
-    corrected, largest = [0.0] * len(p_values), 0.0
-    for rank, i in enumerate(sorted(range(len(p_values)), key=lambda i: p_values[i])):
-        largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[i]))
-        corrected[i] = largest
-    return corrected
-
-
 def _count(row: Mapping[Hashable, Any]) -> _Count:
     delay = math.inf if pd.isna(row["delay_s"]) else float(row["delay_s"])
     return _Count(
@@ -187,7 +179,7 @@ def _paired(one: _Count, other: _Count, rows: pd.DataFrame) -> float:
     this, that = (scored[(scored["method"] == who.method) & (scored["model"] == who.model)] for who in (one, other))
     both = this.merge(that, on="case", suffixes=("", "_other"))
     bad, bad_other = both["failed"] | both["stuck"], both["failed_other"] | both["stuck_other"]
-    return mcnemar(int((bad & ~bad_other).sum()), int((~bad & bad_other).sum()))
+    return sign_flip_p((bad.astype(int) - bad_other.astype(int)).to_numpy(), clusters_of(both).to_numpy())
 
 
 def _sentence(standings: Sequence[_Standing], tied: int, undecided: Sequence[str], sample: bool) -> str:

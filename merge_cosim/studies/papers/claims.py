@@ -9,6 +9,7 @@ import pandas as pd
 
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.published import CYCLE_MS
+from merge_cosim.results.statistics.paired import mean_difference
 from merge_cosim.studies.papers.evidence import Evidence
 from merge_cosim.studies.papers.tables import TESTS, VALIDITY_STEPS, validity
 
@@ -64,10 +65,13 @@ def _pgm_is_best(evidence: Evidence) -> Verdict:
     lines, leads = [], []
     for scenario in _published_tests(evidence):
         rates = _rates(evidence, scenario, (*RIVALS, "pgm"))
-        others = rates.drop("pgm")
-        leads.append(float(others.min() - rates["pgm"]))
-        best = ", ".join(others.index[others == others.min()])
-        lines.append(f"{TESTS[scenario]}: pgm {rates['pgm']:.1f} %, lowest of the rivals {others.min():.1f} % ({best})")
+        best = str(rates.drop("pgm").idxmin())
+        lead = evidence.rate_difference(scenario, best, "pgm")
+        leads.append(lead)
+        lines.append(
+            f"{TESTS[scenario]}: pgm {rates['pgm']:.1f} %, lowest of the rivals {rates[best]:.1f} % ({best}), "
+            f"pgm's lead {_interval(lead)} points"
+        )
     return Verdict(_word(leads), "; ".join(lines))
 
 
@@ -76,19 +80,22 @@ def _ipcb_and_pgm_g_fail_alike(evidence: Evidence) -> Verdict:
     for scenario in [name for name in ("designed-1", "designed-2") if name in evidence.scenarios]:
         first, second, p = evidence.discordant(scenario, "ipcb", "pgm-g")
         rates = _rates(evidence, scenario, ("ipcb", "pgm-g"))
-        alike.append(abs(rates["ipcb"] - rates["pgm-g"]) <= ALIKE)
+        _, low, high = evidence.rate_difference(scenario, "ipcb", "pgm-g")
+        alike.append(HOLDS if low >= -ALIKE and high <= ALIKE else FAILS if low > ALIKE or high < -ALIKE else OPEN)
         lines.append(
             f"{TESTS[scenario]}: ipcb {rates['ipcb']:.1f} %, pgm-g {rates['pgm-g']:.1f} %; only ipcb fails in {first} "
-            f"cases, only pgm-g in {second}" + (f", p = {p:.2g}" if scenario == "designed-1" else "")
+            f"cases, only pgm-g in {second}"
+            + (f", p = {p:.2g}" if scenario == "designed-1" else "")
+            + f"; difference {low:.1f} to {high:.1f} points"
         )
-    return Verdict(HOLDS if all(alike) else FAILS, "; ".join(lines))
+    return Verdict(_all_of(alike), "; ".join(lines))
 
 
 def _fewest_failures_in_the_middle(evidence: Evidence) -> Verdict:
     rates = evidence.nodes.groupby("nodes")["failure_pct"].mean()
     low, high = rates.loc[: BEST_NODES[0] - 1], rates.loc[BEST_NODES[1] + 1 :]
     middle = rates.loc[BEST_NODES[0] : BEST_NODES[1]]
-    leads = [float(side.min() - middle.min()) for side in (low, high)]
+    leads = [(float(side.min() - middle.min()),) * 3 for side in (low, high)]
     text = (
         f"fewest failures within {BEST_NODES[0]}-{BEST_NODES[1]} nodes {middle.min():.2f} %, with fewer nodes "
         f"{low.min():.2f} % (at {low.idxmin():g}), with more {high.min():.2f} % (at {high.idxmin():g}); over "
@@ -100,18 +107,30 @@ def _fewest_failures_in_the_middle(evidence: Evidence) -> Verdict:
 def _i80_is_easier(evidence: Evidence) -> Verdict:
     if "i80-replay" not in evidence.scenarios:
         return Verdict(OPEN, "no I-80 pairs of this source")
-    methods = (*RIVALS, "pgm")
-    us101, i80 = (_rates(evidence, name, methods) for name in ("us101-replay", "i80-replay"))
-    lines = [f"{method} {us101[method]:.1f} against {i80[method]:.1f} %" for method in methods]
-    return Verdict(_word((us101 - i80).tolist()), f"US-101 against I-80: {'; '.join(lines)}")
+    lines, leads = [], []
+    for method in (*RIVALS, "pgm"):
+        columns = ["failure_pct", "ci_low_pct", "ci_high_pct"]
+        sites = ("us101-replay", "i80-replay")
+        us101, i80 = (evidence.outcome(name).loc[method, columns].to_numpy(dtype=float) for name in sites)
+        rate, low, high = us101 - i80[[0, 2, 1]]
+        leads.append((float(rate), float(low), float(high)))
+        lines.append(f"{method} {us101[0]:.1f} against {i80[0]:.1f} %")
+    return Verdict(_word(leads), f"US-101 against I-80: {'; '.join(lines)} (judged by Wilson's intervals)")
 
 
 def _pgm_drives_most_like_the_human(evidence: Evidence) -> Verdict:
-    rows = evidence.outcome("us101-replay")
-    distance = rows.loc[[*RIVALS, "pgm"], "human_station_rms_m"].astype(float)
-    lines = [f"{method} {value:.2f} m" for method, value in distance.sort_values().items()]
-    text = f"mean RMS difference of station to the human: {', '.join(lines)}"
-    return Verdict(HOLDS if distance.idxmin() == "pgm" else FAILS, text)
+    rows = evidence.cases("us101-replay").drop_duplicates(["case", "method"])
+    distance = rows.pivot(index="case", columns="method", values="human_station_rms_m").astype(float)
+    cars = rows.drop_duplicates("case").set_index("case")["car"]
+    means = distance[[*RIVALS, "pgm"]].mean().sort_values()
+    nearest = str(means.drop("pgm").idxmin())
+    mean, (low, high) = mean_difference(distance[nearest], distance["pgm"], cars.reindex(distance.index))
+    lead = (mean, mean if low is None else low, mean if high is None else high)
+    lines = [f"{method} {value:.2f} m" for method, value in means.items()]
+    text = (
+        f"mean RMS difference of station to the human: {', '.join(lines)}; pgm's lead on {nearest} {_interval(lead)} m"
+    )
+    return Verdict(_word([lead]), text)
 
 
 def _graph_and_mixture_help(evidence: Evidence) -> Verdict:
@@ -166,9 +185,22 @@ def _published_tests(evidence: Evidence) -> list[str]:
     return [name for name in evidence.scenarios if name != "designed-3"]
 
 
-def _word(leads: Sequence[float]) -> str:
-    """Holds where every lead is positive, does not where one is negative, undecided where it is a tie."""
-    return HOLDS if min(leads) > 0 else FAILS if min(leads) < 0 else OPEN
+Lead = tuple[float, float, float]
+"""By how much a claim is right (positive) or wrong: the estimate, and the low and high end of its interval."""
+
+
+def _word(leads: Sequence[Lead]) -> str:
+    """Judge a claim that needs every lead to be positive."""
+    return _all_of([HOLDS if low > 0 else FAILS if high < 0 else OPEN for _, low, high in leads])
+
+
+def _all_of(words: Sequence[str]) -> str:
+    """Holds where all parts hold, does not where one does not, else undecided."""
+    return FAILS if FAILS in words else OPEN if OPEN in words else HOLDS
+
+
+def _interval(lead: Lead) -> str:
+    return f"{lead[0]:.2f} ({lead[1]:.2f} to {lead[2]:.2f})"
 
 
 def _rates(evidence: Evidence, scenario: str, methods: tuple[str, ...]) -> pd.Series:

@@ -9,10 +9,11 @@ from pathlib import Path
 import pandas as pd
 
 from merge_cosim.report.tables import ranges, summary_frame
-from merge_cosim.results.statistics.comparison import compare
-from merge_cosim.results.statistics.summary import ALL_SITES, ALL_STARTS
+from merge_cosim.results.statistics.comparison import clusters_of, compare
+from merge_cosim.results.statistics.paired import mean_difference
+from merge_cosim.results.statistics.summary import ALL_SITES, ALL_STARTS, is_sample
 from merge_cosim.results.store import BELIEF_CSV, SUMMARY_JSON, ResultFolder
-from merge_cosim.studies.reproduction import DESIGNED, NODE_SWEEP, PAIRS, Study
+from merge_cosim.studies.reproduction import DESIGNED, MODEL_SWEEP, NODE_SWEEP, PAIRS, Study
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Evidence:
         summary: Summary rows of the tests, one per scenario, site and method.
         nodes: Summary rows of the node sweep, with the column `nodes`.
         beliefs: How good beliefs were by distance, one row per test, site, method and gate.
+        by_model: Summary rows of Designed Test II, one per method and model of the ensemble.
     """
 
     source: str
@@ -34,6 +36,7 @@ class Evidence:
     summary: pd.DataFrame
     nodes: pd.DataFrame
     beliefs: pd.DataFrame
+    by_model: pd.DataFrame
 
     @property
     def scenarios(self) -> list[str]:
@@ -51,6 +54,27 @@ class Evidence:
     def cases(self, scenario: str) -> pd.DataFrame:
         """Result rows of a test."""
         return self.results[self.results["scenario"] == scenario]
+
+    def rate_difference(self, scenario: str, one: str, other: str) -> tuple[float, float, float]:
+        """Failure rate of `one` minus that of `other` [points] on the cases that both carry to the end, low and high.
+
+        Over a sample the ends are the bootstrap's 95 % interval over merging cars, over a fixed grid the range over the
+        models of the ensemble.
+        """
+        rows = self.cases(scenario)
+        kept = rows[~rows["censored"] & rows["method"].isin((one, other))].drop_duplicates(["case", "method"])
+        failed = (100.0 * kept.pivot(index="case", columns="method", values="failed").astype(float)).dropna()
+        if is_sample(kept):
+            clusters = clusters_of(kept[kept["method"] == one]).set_axis(kept.loc[kept["method"] == one, "case"])
+            mean, (low, high) = mean_difference(failed[one], failed[other], clusters.reindex(failed.index))
+            return mean, mean if low is None else low, mean if high is None else high
+        mean = float((failed[one] - failed[other]).mean())
+        rates = self.by_model.pivot(index="model", columns="method", values="failure_pct").astype(float)
+        rates = rates.reindex(columns=[one, other])
+        for method in (one, other):  # a method that learns nothing is the same with every model
+            rates[method] = rates[method].fillna(float(failed[method].mean()))
+        spread = rates[one] - rates[other]
+        return mean, min(mean, float(spread.min())), max(mean, float(spread.max()))
 
     def discordant(self, scenario: str, one: str, other: str) -> tuple[int, int, float]:
         """Cases in which only `one` fails, only `other` fails, and the p value of McNemar's exact test."""
@@ -75,6 +99,7 @@ def gather(studies: Sequence[Study], out: Path) -> list[Evidence]:
                 summary=pd.concat([_summary(by_name[name]) for name in names], ignore_index=True),
                 nodes=nodes.dropna(subset="nodes").sort_values("nodes"),
                 beliefs=pd.concat([_beliefs(out / name) for name in names], ignore_index=True),
+                by_model=_summary(by_name[f"{MODEL_SWEEP}-{study.source}"]),
             )
         )
     return found
