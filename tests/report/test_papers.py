@@ -1,6 +1,7 @@
 """The reproduction of the papers on a small part of each test: real sweeps, one page, tables and verdicts."""
 
 import re
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 import results_page
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.estimators.learned.model import MODELS
 from merge_cosim.ngsim.sites import site
 from merge_cosim.report.methods import looks
 from merge_cosim.report.published import published
@@ -18,7 +20,7 @@ from merge_cosim.results.store import RESULTS
 from merge_cosim.studies.papers import cases, claims, figures, tables
 from merge_cosim.studies.papers.evidence import Evidence, gather
 from merge_cosim.studies.papers.page import write_reproduction
-from merge_cosim.studies.reproduction import DESIGNED, NODE_SWEEP, PAIRS, Study, run, studies
+from merge_cosim.studies.reproduction import DESIGNED, MODEL_SWEEP, NODE_SWEEP, PAIRS, Study, run, studies
 from merge_cosim.sweeps.sweep import SweepRequest
 
 METHODS = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg", "fg-gmm", "always-go", "human")
@@ -28,8 +30,11 @@ COARSE = {f"encounters.{name}.step": 12 for name in ("host_speed", "merging_spee
 
 
 @pytest.fixture(scope="module")
-def small() -> list[Study]:
+def small(tmp_path_factory: pytest.TempPathFactory) -> list[Study]:
     """A grid of few speeds, and one in twenty of the surrogate's pairs, none of the training cars among them."""
+    several = tmp_path_factory.mktemp("models")
+    for name in ("us101-ngsim", "us101-surrogate"):
+        shutil.copy(MODELS / f"{name}.json", several)
     designed = SweepRequest(("designed-2",), METHODS, settings=COARSE)
     pairs = SweepRequest(
         ("us101-replay",), METHODS, "us101-surrogate", {"encounters.fraction": 0.95}, source="surrogate"
@@ -39,6 +44,7 @@ def small() -> list[Study]:
         Study(DESIGNED, DESIGNED, designed),
         Study(PAIRS, "surrogate", pairs),
         Study(NODE_SWEEP, "surrogate", nodes),
+        Study(MODEL_SWEEP, "surrogate", replace(designed, methods=("pgm", "pgm-g", "ipcb"), model=str(several))),
     ]
 
 
@@ -135,11 +141,27 @@ def _with_rates(evidence: Evidence, rates: dict[str, float]) -> Evidence:
 
 
 @pytest.mark.parametrize(
-    ("pgm", "word"), [(0.5, claims.HOLDS), (1.0, claims.OPEN), (1.5, claims.FAILS)], ids=["lowest", "tie", "higher"]
+    ("leads", "word"),
+    [
+        ([(1.0, 0.5, 2.0), (0.2, 0.1, 0.3)], claims.HOLDS),
+        ([(1.0, 0.5, 2.0), (0.2, -0.1, 0.5)], claims.OPEN),
+        ([(1.0, 0.5, 2.0), (-1.0, -2.0, -0.5)], claims.FAILS),
+        ([(0.0, 0.0, 0.0)], claims.OPEN),
+    ],
+    ids=["all ahead", "one interval holds 0", "one behind", "tie"],
 )
-def test_lowest_is_lower_than_all_others(evidence, pgm, word):
-    rates = {"acc": 3.0, "slot": 2.0, "ipcb": 1.0, "pgm-g": 1.0, "pgm": pgm}
-    assert claims.CLAIMS[0].judge(_with_rates(evidence, rates)).word == word
+def test_a_verdict_needs_intervals_on_one_side(leads, word):
+    assert claims._word(leads) == word
+
+
+def test_a_grid_is_judged_by_the_range_over_models(evidence):
+    same = {"scenario": "designed-2", "source": "designed", "car": "", "censored": False}
+    cases = pd.DataFrame({"case": list("abcd")}).assign(**same)
+    rows = [cases.assign(method="acc", failed=[True, True, False, False])]
+    rows += [cases.assign(method="pgm", failed=[True, False, False, False])]
+    by_model = pd.DataFrame({"method": "pgm", "model": ["m0", "m1", "m2"], "failure_pct": [0.0, 60.0, 25.0]})
+    found = replace(evidence, results=pd.concat(rows), by_model=by_model).rate_difference("designed-2", "acc", "pgm")
+    assert found == (25.0, -10.0, 50.0)
 
 
 def test_the_curve_over_nodes_needs_a_lowest_middle(evidence):
