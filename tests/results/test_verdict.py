@@ -124,7 +124,15 @@ def test_one_verdict_for_each_site_and_the_rows_of_all_sites_together():
 def _models(source, /, **shares):
     """Summary rows of methods with several models of 40 cases, from the failures under each; and their rows."""
     same = {"scenario": "s", "variation": "", "site": "x", "source": source, "n": 40, "stuck": 0, "delay_s": 1.0}
-    key = {"scenario": "s", "variation": "", "site": "x", "source": source, "censored": False, "stuck": False}
+    key = {
+        "scenario": "s",
+        "variation": "",
+        "site": "x",
+        "source": source,
+        "car": "",
+        "censored": False,
+        "stuck": False,
+    }
     runs = [(method, f"m{i}", bad) for method, found in shares.items() for i, bad in enumerate(found)]
     rows = [key | {"method": m, "model": k, "case": f"{i}", "failed": i < bad} for m, k, bad in runs for i in range(40)]
     return pd.DataFrame([same | {"method": m, "model": k, "failures": bad} for m, k, bad in runs]), pd.DataFrame(rows)
