@@ -36,6 +36,7 @@ def sweep(
     out: str | Path | None = None,
     resume: bool = False,
     overwrite: bool = False,
+    add: bool = False,
     progress: bool = True,
 ) -> Results:
     """Run every case of some scenarios under some methods.
@@ -66,6 +67,8 @@ def sweep(
         out: Result folder; a temporary one, kept as long as the returned object, if not given.
         resume: Finish an interrupted sweep in `out`; a finished one is read, not run again.
         overwrite: Replace the sweep that `out` holds, finished or not.
+        add: Add methods, variations, scenarios or cases to the finished sweep in `out`, of the same settings; its rows
+            are then those of one sweep of all. Without `methods`, those that it holds.
         progress: Show how far the sweep is, on standard error.
 
     Returns:
@@ -92,5 +95,5 @@ def sweep(
     )
     results = Results(tempfile.mkdtemp(prefix="merge-cosim-"), temporary=True) if out is None else Results(out)
     with sweep_progress(progress) as told:
-        run_sweep(request, results.path, resume=resume, overwrite=overwrite, progress=told)
+        run_sweep(request, results.path, resume=resume, overwrite=overwrite, add=add, progress=told)
     return results

@@ -93,6 +93,7 @@ def sweep(
     verify: Annotated[
         float | None, typer.Option(metavar="SHARE", help="Afterwards run this share of the rows again in SUMO.")
     ] = None,
+    add: Annotated[bool, typer.Option("--add", help="Add methods, scenarios or cases to the sweep there.")] = False,
     wide: Wide = False,
     columns: Columns = None,
     json: Json = False,
@@ -103,9 +104,9 @@ def sweep(
     from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
     from merge_cosim.scenarios.settings import parse_setting, parse_variation
 
-    if resume and overwrite:
-        raise UserError("--resume, --overwrite: choose one")
-    with resumable(f"what was finished is kept in {out}; go on with --resume"):
+    if resume + overwrite + add > 1:
+        raise UserError("--resume, --overwrite, --add: choose one")
+    with resumable(f"what was finished is kept in {out}; go on with {'--add' if add else '--resume'}"):
         results = run_sweep(
             scenarios,
             method,
@@ -124,6 +125,7 @@ def sweep(
             out=out,
             resume=resume,
             overwrite=overwrite,
+            add=add,
         )
         again = (
             None if verify is None else results.verify(verify, data=data, model=model, plugins=plugin or (), jobs=jobs)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
@@ -33,6 +33,10 @@ RESULTS, SUMMARY_CSV, SUMMARY_JSON, MANIFEST, TRACES = (
 )
 
 
+OF_SCENE = ("scenario", "variation", "method", "scene")
+"""What names a scene in the tables of scenes."""
+BEFORE = "before"
+"""The parts that hold what a reopened folder held begin so."""
 STRETCH_ROWS = 100_000
 """Rows that are sorted and written at a time; more where more cases lie between each other."""
 
@@ -92,7 +96,7 @@ class ResultFolder:
                     f"--overwrite replaces it, or choose another --out"
                 )
             raise UserError(
-                f"{self.path}: holds a finished sweep; --overwrite replaces it, --resume keeps it if it is the same; "
+                f"{self.path}: holds a finished sweep; --overwrite replaces it, --add adds to it, --resume keeps it; "
                 f"or choose another --out"
             )
         if not (resume and self._plan.is_file()):
@@ -100,6 +104,43 @@ class ResultFolder:
                 part.unlink()
         self._parts.mkdir(parents=True, exist_ok=True)
         _write_text(self._plan, json.dumps(plan, indent=1))
+
+    def reopen(self, plan: dict[str, Any], drop: str) -> None:
+        """Make ready for adding to a finished sweep: its rows and its facts of scenes become parts.
+
+        Args:
+            plan: What the sweep will be afterwards.
+            drop: A method whose rows are left out, as they are made anew from the others.
+
+        Raises:
+            UserError: The folder holds no finished sweep, or something else was being done with it.
+        """
+        if self._plan.is_file():
+            changed = _changed(plan, _read_json(self._plan))
+            if changed:
+                raise UserError(
+                    f"{self.path}: holds an unfinished sweep, which is another one ({', '.join(changed)} changed); "
+                    f"finish it first, by its own command"
+                )
+            return
+        self.results([])
+        self._parts.mkdir(exist_ok=True)
+        for part in self._parts.glob("*.parquet"):
+            part.unlink()
+        self.add(f"{BEFORE}-scenes", with_scene_facts(SCHEMA.empty_table(), self._scene_facts()))
+        with pq.ParquetFile(self.path / RESULTS) as file:
+            for number in range(file.num_row_groups):
+                rows = file.read_row_group(number)
+                self.add(f"{BEFORE}-{number:05d}", rows.filter(pc.not_equal(rows["method"], drop)))
+        _write_text(self._plan, json.dumps(plan, indent=1))
+
+    def before(self, scenario: str, variation: str, columns: list[str]) -> pa.Table:
+        """Of a reopened folder: the rows that it held of one scenario and variation."""
+        which = [("scenario", "=", scenario), ("variation", "=", variation)]
+        files = sorted(self._parts.glob(f"{BEFORE}-*.parquet"))
+        return pa.concat_tables(
+            pq.read_table(file, columns=columns, filters=which).replace_schema_metadata() for file in files
+        )
 
     def holds(self, plan: dict[str, Any]) -> bool:
         """Whether a finished sweep of this plan is here."""
@@ -127,10 +168,7 @@ class ResultFolder:
             _replacing(self.path / RESULTS) as unfinished,
             pq.ParquetWriter(unfinished, SCHEMA, compression="zstd") as writer,
         ):
-            for rows in self._stretches():
-                if more is not None:
-                    rows = pa.concat_tables([rows, more(rows)])
-                rows = rows.sort_by(KEY).replace_schema_metadata(SCHEMA.metadata)
+            for rows in _row_groups(_completed(rows, more) for rows in self._stretches()):
                 writer.write_table(rows, row_group_size=len(rows))
 
     def _stretches(self) -> Iterator[pa.Table]:
@@ -166,6 +204,21 @@ class ResultFolder:
     def traffic(self) -> list[dict[str, Any]]:
         """Rows of the finished sweep's table of scenes; none where there were no scenes."""
         return _csv_rows(self.path / TRAFFIC_CSV)
+
+    def _scene_facts(self) -> list[dict[str, Any]]:
+        """Facts of the scenes of a finished sweep, as `with_scene_facts` takes them."""
+        file = self.path / SCENES_CSV
+        if not file.is_file():
+            return []
+        notes: dict[tuple[str, ...], list[list[str]]] = {}
+        for note in _csv_rows(self.path / NOTES_CSV):
+            notes.setdefault(tuple(note[name] for name in OF_SCENE), []).append([note["event"], note["what"]])
+        names = dict.fromkeys((*OF_SCENE, "model"), str)
+        frame = pd.read_csv(file, dtype=names, keep_default_na=False, na_values={})  # names may be 'NA'
+        numbers = frame.columns.difference([*names])
+        frame[numbers] = frame[numbers].apply(pd.to_numeric)
+        facts: list[dict[str, Any]] = json.loads(frame.to_json(orient="records", double_precision=15))
+        return [fact | {"notes": notes.get(tuple(fact[name] for name in OF_SCENE), [])} for fact in facts]
 
     def note_lines(self) -> list[str]:
         """What the user should know of the results: a line for each kind of event in scenes, and on models."""
@@ -261,6 +314,24 @@ class ResultFolder:
 def with_scene_facts(rows: pa.Table, facts: list[dict[str, Any]]) -> pa.Table:
     """Result rows with the facts of the scenes that they come from, for `ResultFolder.add`."""
     return rows.replace_schema_metadata({**(SCHEMA.metadata or {}), SCENE_FACTS: json.dumps(facts)})
+
+
+def _completed(rows: pa.Table, more: Callable[[pa.Table], pa.Table] | None) -> pa.Table:
+    """Rows of whole cases along with those made of them, sorted."""
+    every = rows if more is None else pa.concat_tables([rows, more(rows)])
+    return every.sort_by(KEY).replace_schema_metadata(SCHEMA.metadata)
+
+
+def _row_groups(stretches: Iterable[pa.Table]) -> Iterator[pa.Table]:
+    """Sorted rows in groups of `STRETCH_ROWS`, none of two scenarios or variations: however they were parted before."""
+    for _, of_one in groupby(stretches, key=lambda rows: (rows["scenario"][0], rows["variation"][0])):
+        held = SCHEMA.empty_table()
+        for rows in of_one:
+            held = pa.concat_tables([held, rows]).combine_chunks()
+            while len(held) > STRETCH_ROWS:
+                yield held[:STRETCH_ROWS]
+                held = held[STRETCH_ROWS:]
+        yield held
 
 
 def _changed(plan: dict[str, Any], before: dict[str, Any]) -> list[str]:

@@ -44,9 +44,17 @@ def identity(request: SweepRequest, tasks: Sequence[Task]) -> dict[str, Any]:
             " ".join(filter(None, (task.scenario.name, task.variation))): task.scenario.model_dump(mode="json")
             for task in tasks
         },
-        "encounters": digest(*(task.digest().encode() for task in tasks)),
+        "encounters": _encounters(tasks),
         "plugins": {plugin.name: digest(plugin.read_bytes()) for plugin in request.plugins},
     }
+
+
+def _encounters(tasks: Sequence[Task]) -> dict[str, str]:
+    """A digest of the cases of each scenario and variation; the same whichever methods drive in them."""
+    found: dict[str, dict[str, None]] = {}
+    for task in tasks:
+        found.setdefault(" ".join(filter(None, (task.scenario.name, task.variation))), {})[task.digest()] = None
+    return {name: digest(*map(str.encode, sorted(parts))) for name, parts in found.items()}
 
 
 def versions() -> dict[str, str]:

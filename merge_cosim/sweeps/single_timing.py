@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -21,15 +21,22 @@ SINGLE_CASES = 5
 _NO_RECORDS = pd.DataFrame({name: pd.Series(dtype=str) for name in ("scenario", "case", "method")})
 
 
-def time_single_cases(tasks: Sequence[Task], results: ResultFolder) -> tuple[dict[str, float], pa.Table]:
+def time_single_cases(
+    tasks: Sequence[Task], results: ResultFolder, chosen: Mapping[str, str] | None = None
+) -> tuple[dict[str, float], pa.Table]:
     """Run a few cases of each scenario and method one at a time, the illustrative one first and recorded.
 
     Living traffic is left out: its encounters cannot be run alone.
 
+    Args:
+        tasks: What was run.
+        results: Its rows.
+        chosen: The illustrative cases of some scenarios; those of the others are chosen here.
+
     Returns:
         Time of one update in a batch of one [us] by method, and the records of the illustrative cases.
     """
-    illustrative: dict[str, str] = {}
+    illustrative = dict(chosen or {})
     efforts: dict[str, Effort] = {}
     records = [_NO_RECORDS]
     worker_session = WorkerSession(tiles=1)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
 
+from merge_cosim.core.errors import UserError
 from merge_cosim.results.statistics import belief, calibration, oracle_best, strata, summarise
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.results.statistics.ensemble import ensemble, rivals
@@ -27,10 +29,11 @@ from merge_cosim.results.store import (
 )
 from merge_cosim.scenarios.methods import ORACLE_BEST
 from merge_cosim.simulation.loop import Effort
+from merge_cosim.sweeps.adding import joined, missing
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
 from merge_cosim.sweeps.executors import executor_for
 from merge_cosim.sweeps.identity import identity
-from merge_cosim.sweeps.plan import SweepRequest, method_names, plan
+from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.single_timing import time_single_cases
 from merge_cosim.sweeps.task import Task
 
@@ -52,11 +55,42 @@ class _Tally:
         self.by_method.setdefault(method, Effort()).add(effort)
 
 
+@dataclass(frozen=True)
+class _Earlier:
+    """What is kept of the sweep that is added to.
+
+    Attributes:
+        traces: Its traces of the illustrative cases.
+        cycle_us: For each of its methods the time of one update per encounter in a full batch, and in a batch of one.
+    """
+
+    traces: pd.DataFrame = field(default_factory=pd.DataFrame)
+    cycle_us: dict[str, tuple[float, float | None]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, folder: ResultFolder) -> _Earlier:
+        rows = folder.read_json(SUMMARY_JSON)
+        times = {row["method"]: (row["cycle_us"], row["cycle_us_single"]) for row in rows if row["cycle_us"]}
+        return cls(folder.traces().to_pandas(), times)
+
+    @property
+    def cases(self) -> dict[str, str]:
+        """The illustrative case of each scenario."""
+        return dict(zip(self.traces["scenario"], self.traces["case"], strict=True)) if len(self.traces) else {}
+
+    def with_traces(self, new: pa.Table) -> pa.Table:
+        """Its traces along with those of the methods that were run now."""
+        if not len(self.traces):
+            return new
+        return pa.Table.from_pandas(pd.concat([self.traces, new.to_pandas()]).drop_duplicates(), preserve_index=False)
+
+
 def sweep(
     request: SweepRequest,
     out: Path,
     resume: bool = False,
     overwrite: bool = False,
+    add: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Run a sweep and write its result folder; returns the manifest.
@@ -66,31 +100,53 @@ def sweep(
         out: Result folder.
         resume: Finish an interrupted sweep; a finished one is left as it is.
         overwrite: Replace what the folder holds; with `resume`, a finished sweep of another request.
+        add: Run what the finished sweep in the folder lacks; its own methods, if the request names none.
         progress: Told how far it is.
 
     Raises:
-        UserError: See `plan` and `ResultFolder.begin`.
+        UserError: See `plan`, `adding.joined` and `ResultFolder.begin`.
     """
     begin = perf_counter()
-    tasks = plan(request)
     folder = ResultFolder(out)
+    before: dict[str, Any] = folder.read_json(MANIFEST) if add else {}
+    against = request.against
+    if add:  # the method to compare with may be one of the folder's
+        request = replace(request, methods=request.methods or before["methods"], against=None)
+    tasks = plan(request)
     what = identity(request, tasks)
-    if resume and folder.holds(what):
+    earlier = _Earlier()
+    if add:
+        what = joined(before, what, against, out)
+        reference_of(what["methods"], against)
+        folder.reopen(what, ORACLE_BEST)
+        earlier = _Earlier.of(folder)
+        try:
+            tasks = list(missing(tasks, folder))
+        except UserError:
+            folder.finish()  # as it was
+            raise
+    elif resume and folder.holds(what):
         manifest: dict[str, Any] = folder.read_json(MANIFEST)
         return manifest
-    folder.begin(what, resume, overwrite)
+    else:
+        folder.begin(what, resume, overwrite)
     planned = perf_counter()
     tally = _run(request, list(cut(tasks)), folder, progress)
     ran = perf_counter()
-    wants_best = not request.methods or ORACLE_BEST in request.methods
-    folder.merge(oracle_best if wants_best else None)
-    scenes = folder.scenes()
-    _sum_up(tasks, folder, scenes, tally, reference_of(method_names(request, tasks), request.against))
+    folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
+    _sum_up(tasks, folder, folder.scenes(), tally, reference_of(what["methods"], what["against"]), earlier)
     effort, run_s = tally.effort, ran - planned
     manifest = {
         **what,
-        "left_out": {task.scenario.name: list(task.left_out) for task in tasks if task.left_out},
-        "command": {"jobs": request.jobs, "start": request.start, "dask": request.dask, "resumed": resume},
+        "left_out": before.get("left_out", {})
+        | {task.scenario.name: list(task.left_out) for task in tasks if task.left_out},
+        "command": {
+            "jobs": request.jobs,
+            "start": request.start,
+            "dask": request.dask,
+            "resumed": resume,
+            "added": add,
+        },
         "wall_s": round(perf_counter() - begin, 3),
         "plan_s": round(planned - begin, 3),
         "run_s": round(run_s, 3),
@@ -101,7 +157,7 @@ def sweep(
         "vehicle_steps_per_s": round(effort.vehicle_steps / run_s) if effort.vehicle_steps else None,
         "ratio_to_bare_sumo": round(effort.wall_s / effort.step_s, 3) if effort.step_s else None,
         "real_time_factor": round(effort.scene_s / effort.wall_s, 2) if effort.scene_s else None,
-        "worst_station_difference_m": effort.worst_difference_m,
+        "worst_station_difference_m": max(effort.worst_difference_m, before.get("worst_station_difference_m", 0.0)),
     }
     folder.write_json(MANIFEST, manifest)
     folder.finish()
@@ -126,12 +182,17 @@ def _run(request: SweepRequest, chunks: Sequence[Chunk], folder: ResultFolder, p
 
 
 def _sum_up(
-    tasks: Sequence[Task], folder: ResultFolder, scenes: list[dict[str, Any]], tally: _Tally, against: str | None
+    tasks: Sequence[Task],
+    folder: ResultFolder,
+    scenes: list[dict[str, Any]],
+    tally: _Tally,
+    against: str | None,
+    earlier: _Earlier,
 ) -> None:
     """Write the traces, the summary and the tables beside it, one scenario and variation at a time."""
-    single_us, traces = time_single_cases(tasks, folder)
-    folder.write_traces(traces)
-    cycle_us = {
+    single_us, traces = time_single_cases(tasks, folder, earlier.cases)
+    folder.write_traces(earlier.with_traces(traces))
+    cycle_us = earlier.cycle_us | {
         name: (1e6 * effort.method_s / effort.encounter_cycles, single_us.get(name))
         for name, effort in tally.by_method.items()
         if effort.encounter_cycles
