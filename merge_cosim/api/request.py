@@ -14,12 +14,13 @@ from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ngsim.data import find_data
 from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.scenarios.methods import MethodSpec
-from merge_cosim.scenarios.scenario import Scenario, scenario_of
+from merge_cosim.scenarios.scenario import Scenario, family, scenario_of
 from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.sweeps.plan import ScenarioSpec, StartMethod, SweepRequest
 
 ScenarioLike: TypeAlias = str | Path | Scenario | Encounters
-"""A shipped scenario's name, a scenario file or SUMO configuration, a scenario, or initial states."""
+"""The name of a shipped scenario or of a family of them, a scenario file, a SUMO configuration, a scenario, or
+initial states."""
 Scenarios: TypeAlias = ScenarioLike | Sequence[ScenarioLike] | Mapping[str, Scenario | Encounters]
 """One scenario, several, or several by names of the user's choice."""
 Methods: TypeAlias = MethodSpec | Sequence[MethodSpec] | None
@@ -72,7 +73,11 @@ def _scenarios(given: Scenarios) -> list[ScenarioSpec]:
     unnamed = sum(isinstance(one, Encounters) for one in several)
     if unnamed > 1:
         raise UserError(f"{unnamed} batches of encounters need names: mc.sweep({{'first': encounters, ...}})")
-    return [_named("encounters", one) if isinstance(one, Encounters) else _checked(one) for one in several]
+    specs: list[ScenarioSpec] = []
+    for one in several:
+        spec = _named("encounters", one) if isinstance(one, Encounters) else _checked(one)
+        specs += family(spec) if isinstance(spec, str) else [spec]
+    return specs
 
 
 def _named(name: str, given: Scenario | Encounters) -> ScenarioSpec:

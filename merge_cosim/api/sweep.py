@@ -47,8 +47,9 @@ def sweep(
         >>> results.summary()  # doctest: +SKIP
 
     Args:
-        scenarios: A scenario or several: the name of a shipped one, a scenario file, a `.sumocfg`, a `Scenario`, or
-            `Encounters` (initial states of your own). A mapping gives them names.
+        scenarios: A scenario or several: the name of a shipped one or of a family (`"shifted"` is every
+            `"shifted-..."`), a scenario file, a `.sumocfg`, a `Scenario`, or `Encounters` (initial states of your own).
+            A mapping gives them names.
         methods: Methods: a name (`"pgm"`, `"pgm+lqr"`), an estimator or its class, or a pair of an estimator and a
             controller. All that there are, if not given.
         model: Learned model: a file, the name of one that comes with the project, or an `IntentionModel`. None takes

@@ -70,7 +70,9 @@ def sweep(
     scenarios: Annotated[
         list[str],
         typer.Argument(
-            metavar="SCENARIO...", help="Shipped scenarios or scenario files.", autocompletion=scenarios_like
+            metavar="SCENARIO...",
+            help="Shipped scenarios, families (shifted), or files.",
+            autocompletion=scenarios_like,
         ),
     ],
     method: Methods = None,

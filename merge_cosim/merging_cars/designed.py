@@ -1,14 +1,15 @@
 """The papers' designed merging strategy: accelerate to the limit, or keep distance to a host ahead."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from pydantic import NonNegativeFloat
 
 from merge_cosim.controllers.law import DistanceKeeping
 from merge_cosim.core.observation import Observation
-from merge_cosim.core.units import TOLERANCE, FloatArray, IntArray
+from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.merging_cars.ahead import Ahead, gap_to_host, host_is_ahead
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 
 
@@ -27,17 +28,10 @@ class Designed(DistanceKeeping, MergingCar):
 
     name: ClassVar[str] = "designed"
     headway: NonNegativeFloat = 1.0
-    ahead: Literal["clear", "in-lane", "any"] = "clear"
+    ahead: Ahead = "clear"
 
     def next_speed(self, age: IntArray, now: Observation) -> FloatArray:
         """One step of the strategy."""
-        lead = now.host_station - now.merging_station
-        gap = lead - now.host_length
-        if self.ahead == "clear":
-            host_ahead = gap > TOLERANCE
-        else:
-            host_ahead = lead > TOLERANCE
-            if self.ahead == "in-lane":
-                host_ahead &= np.minimum(now.merging_station, now.host_station) >= -TOLERANCE
-        acceleration = self.drive(host_ahead, gap, now.merging_speed, now.host_speed, self.setting.speed_limit)
+        ahead, limit = host_is_ahead(now, self.ahead), self.setting.speed_limit
+        acceleration = self.drive(ahead, gap_to_host(now), now.merging_speed, now.host_speed, limit)
         return np.maximum(now.merging_speed + acceleration * self.setting.dt, 0.0)

@@ -17,6 +17,7 @@ from merge_cosim.core.encounter import Encounters, Intention
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import normal, stream_keys, uniform
 from merge_cosim.core.units import TOLERANCE, FloatArray, IntArray, Share
+from merge_cosim.merging_cars.ahead import gap_to_host, host_is_ahead
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 
 IGNORE = int(Intention.UNKNOWN)
@@ -165,6 +166,5 @@ class Hidden(DistanceKeeping, MergingCar):
         return self.clip(np.where(yields, np.minimum(needed, 0.0), np.maximum(needed, 0.0)))
 
     def _behind_or_free(self, now: Observation) -> FloatArray:
-        lead = now.host_station - now.merging_station
-        gap, limit = lead - now.host_length, self.setting.speed_limit
-        return self.drive(lead > TOLERANCE, gap, now.merging_speed, now.host_speed, limit)
+        ahead, limit = host_is_ahead(now, "any"), self.setting.speed_limit
+        return self.drive(ahead, gap_to_host(now), now.merging_speed, now.host_speed, limit)

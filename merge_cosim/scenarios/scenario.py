@@ -138,6 +138,13 @@ def scenario_names() -> list[str]:
     return sorted(file.stem for file in shipped("scenarios").glob("*.toml"))
 
 
+def family(name: str) -> list[str]:
+    """The scenarios that a name stands for: of a family, as `shifted`, all shipped `shifted-...`; else itself."""
+    names = scenario_names()
+    members = [one for one in names if one.startswith(f"{name}-")]
+    return [name] if name in names or not members or Path(name).is_file() else members
+
+
 def load_scenario(scenario: str | Path | Scenario, settings: Mapping[str, Any] | None = None) -> Scenario:
     """Read a shipped scenario by name, or any by file, with some values set otherwise (`test.horizon`, `ramp`, ...).
 
