@@ -1,8 +1,8 @@
-"""Write the tables of docs/sensors.md: how methods bear what they were not made for.
+"""Write the tables of docs/sensors.md and of the shifted drivers in docs/tests.md, for drivers and errors not made for.
 
-    python tools/robustness_page.py [--from DIR]
+    python tools/robustness_page.py [--sensing DIR] [--shifted DIR]
 
-runs the sweep that the page shows, in the closed form, and sets its summary into the page's block.
+runs the two sweeps that the pages show, in the closed form, and sets their summaries into the pages' blocks.
 """
 
 import tempfile
@@ -21,6 +21,7 @@ SENSING = (
     *("--vary", "sensing.station_sigma=1,3", "--vary", "sensing.speed_sigma=0.1,0.5,1"),
     *("--vary", "sensing.dropout=0.3"),
 )
+SHIFTED = ("sweep", "designed-3", "shifted", "--world", "closed-form", "--method", "acc,slot-time,pgm,ipcb,oracle-best")
 SHORT = ("--set", "encounters.count=8", "--jobs", "1")
 
 
@@ -32,14 +33,14 @@ def summary_of(words: Sequence[str], short: bool, folder: Path | None) -> pd.Dat
     return pd.read_json(folder / "summary.json")
 
 
-def block(words: Sequence[str], summary: pd.DataFrame, row: str, first: str) -> str:
+def block(words: Sequence[str], summary: pd.DataFrame, row: str) -> str:
     """The command and its table: a row for each value of the column `row`, a column for each method."""
     shown = " ".join(("merge-cosim", *words)).replace(" --vary", " \\\n    --vary") + " --out OUT"
     methods = in_order(summary["method"])
     cells = summary.assign(cell=[_cell(one) for _, one in summary.iterrows()]).pivot(
         index=row, columns="method", values="cell"
     )
-    lines = [[f"`{name}`" if name else first, *cells.loc[name, methods]] for name in dict.fromkeys(summary[row])]
+    lines = [[f"`{name}`" if name else "no error", *cells.loc[name, methods]] for name in dict.fromkeys(summary[row])]
     return f"```\n{shown}\n```\n\n{table([row, *methods], lines)}"
 
 
@@ -48,12 +49,15 @@ def _cell(one: pd.Series) -> str:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the sweep, if need be, and write the tables."""
+    """Run the sweeps, if need be, and write the tables."""
     parser = page_parser(__doc__)
-    parser.add_argument("--from", dest="folder", type=Path, help="result folder of the sweep, if it was run already")
+    for name in ("sensing", "shifted"):
+        parser.add_argument(f"--{name}", type=Path, help="result folder of this sweep, if it was run already")
     given = parser.parse_args(argv)
-    made = block(SENSING, summary_of(SENSING, given.short, given.folder), "variation", "no error")
-    fill_page("sensors.md", given.docs, {"sensing": lambda _: made})
+    sensing = block(SENSING, summary_of(SENSING, given.short, given.sensing), "variation")
+    fill_page("sensors.md", given.docs, {"sensing": lambda _: sensing})
+    shifted = block(SHIFTED, summary_of(SHIFTED, given.short, given.shifted), "scenario")
+    fill_page("tests.md", given.docs, {"shifted": lambda _: shifted})
 
 
 if __name__ == "__main__":

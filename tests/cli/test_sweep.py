@@ -14,6 +14,7 @@ from command import COMMAND, merge_cosim, refused, run_process, small_scenario, 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
 from merge_cosim.results.store import ResultFolder
+from merge_cosim.scenarios.scenario import scenario_names
 
 CONTRACT = [
     "scenario",
@@ -371,3 +372,12 @@ def test_hidden_intentions_through_the_command_line(tmp_path):
     unknown = merge_cosim("report", "out1", "--against", "nosuch", cwd=tmp_path)
     assert unknown.returncode == 2
     assert "--against nosuch" in unknown.stderr
+
+
+def test_a_family_of_scenarios_is_run_as_one(tmp_path):
+    words = ("--world", "closed-form", "--method", "acc,pgm", "--set", "encounters.count=2", "--out", "out")
+    done = merge_cosim("sweep", "shifted", "designed-3", "shifted-idm", *words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = pq.read_table(tmp_path / "out/results.parquet").to_pandas()
+    assert set(rows["scenario"]) == {"designed-3", *(name for name in scenario_names() if name.startswith("shifted-"))}
+    assert len(rows) == 10 * 2 * 2

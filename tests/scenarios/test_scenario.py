@@ -3,7 +3,7 @@ import pytest
 from merge_cosim.controllers.law import FreeDriving
 from merge_cosim.core.errors import UserError
 from merge_cosim.scenarios.methods import Method
-from merge_cosim.scenarios.scenario import load_scenario
+from merge_cosim.scenarios.scenario import family, load_scenario, scenario_names
 from merge_cosim.scenarios.settings import parse_variation
 from merge_cosim.scenarios.sources import Span
 
@@ -34,6 +34,16 @@ def test_no_value_lies_beyond_the_end(first, last, step, values):
 def test_values_that_make_no_sense_are_refused(setting, value, expected):
     with pytest.raises(UserError, match=expected):
         load_scenario("traffic-light", {setting: value})
+
+
+def test_a_family_is_all_shipped_scenarios_that_begin_with_its_name(tmp_path, monkeypatch):
+    assert family("shifted") == [name for name in scenario_names() if name.startswith("shifted-")]
+    assert family("traffic") == ["traffic-dense", "traffic-light", "traffic-stop-and-go"]
+    assert family("designed-2") == ["designed-2"]
+    assert family("shift") == ["shift"]  # no such scenario either
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "shifted").touch()  # a file of the user's own
+    assert family("shifted") == ["shifted"]
 
 
 @pytest.mark.parametrize("text", ["acc.d0", "acc.d0=", "acc.d0=1:2", "acc.d0=2:1:1", "acc.d0=1:2:0", "acc.d0=1:inf:1"])

@@ -40,6 +40,7 @@ def test_sensitivity(tmp_path):
 def test_robustness(tmp_path):
     robustness_page.main(["--short", "--docs", str(tmp_path)])
     assert made_like(tmp_path, "sensors.md").count("| `sensing.") == 13
+    assert made_like(tmp_path, "tests.md").count("%, ") >= 5 * 10
 
 
 def test_traffic(tmp_path):
