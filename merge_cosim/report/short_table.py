@@ -53,7 +53,7 @@ TRAFFIC = (
 IN_TITLE = {"n": "cases each: {}", "scenes": "scenes each: {}", "stuck": "stuck: {}", "variation": "{}"}
 """How the title says what is the same in all rows."""
 LESS_IS_BETTER = ("failure_pct", "stuck", "failed_or_stuck_pct", "delay_s")
-ROWS = ["scenario", "variation", "site", "source", "case", "method", "failed", "stuck", "censored"]
+ROWS = ["scenario", "variation", "site", "source", "case", "car", "method", "model", "failed", "stuck", "censored"]
 """Columns of the rows that a verdict needs."""
 NAMES = ("scenario", "site", "source")
 
