@@ -1,10 +1,25 @@
-"""What an interrupt and a full disk say."""
+"""What an interrupt, the signal to end and a full disk do."""
 
 import errno
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from merge_cosim.core.errors import UserError
+
+
+def ended_by_signal() -> None:
+    """Let SIGTERM end this process as an error would: workers and programs are ended first; status 143."""
+
+    def end(number: int, _: object) -> None:
+        from merge_cosim.core.programs import end_programs
+
+        end_programs()
+        raise SystemExit(128 + number)
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, end)
 
 
 @contextmanager

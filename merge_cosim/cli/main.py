@@ -11,6 +11,7 @@ import typer
 from merge_cosim import __doc__ as about
 from merge_cosim import __version__
 from merge_cosim.cli import lists, ngsim, ramp, results
+from merge_cosim.cli.interrupts import ended_by_signal
 from merge_cosim.cli.options import (
     Against,
     Columns,
@@ -289,8 +290,12 @@ def train(
 
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
+    import os
     import sys
 
+    ended_by_signal()
+    for name in ("LIBSUMO_AS_TRACI", "LIBTRACI_AS_TRACI"):
+        os.environ.pop(name, None)  # with them `import traci` gives another module, and prints that it does
     try:
         sys.exit(app(standalone_mode=False))
     except USAGE_ERROR as error:
@@ -303,6 +308,14 @@ def main() -> None:
         die(str(error))
     except OSError as error:  # a full disk, a folder without permission: the user's to mend, wherever it strikes
         die(f"{error.filename}: cannot be read or written ({error.strerror})" if error.filename else str(error))
+    except MemoryError:
+        die("not enough memory; try fewer --jobs, or fewer cases")
+    except Exception as error:
+        from merge_cosim.core.registry import plugin_error
+
+        if told := plugin_error(error):
+            die(str(told))
+        raise
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import linecache
 import pkgutil
 import re
 import sys
+import traceback
 from abc import ABC
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
@@ -243,6 +244,19 @@ def load_plugin(file: Path) -> None:
         spec.loader.exec_module(module)
     except UserError:
         raise
-    except Exception as error:  # whatever a user's file raises is theirs to mend
+    except (Exception, SystemExit) as error:  # whatever a user's file raises is theirs to mend
         del sys.modules[module_name]
-        raise UserError(f"{file}: cannot be imported: {type(error).__name__}: {error}") from error
+        fault = plugin_error(error) or f"{type(error).__name__}: {error}"
+        raise UserError(f"{file}: cannot be imported: {fault}") from error
+
+
+def plugin_error(error: BaseException) -> UserError | None:
+    """What an error that a user's own file has raised says, with the file's line; None if it comes from elsewhere."""
+    walked = traceback.walk_tb(error.__traceback__)
+    own = [(frame, line) for frame, line in walked if str(frame.f_globals.get("__name__")).startswith(PLUGIN)]
+    if isinstance(error, UserError) or not own:
+        return None
+    frame, line = own[-1]
+    code, text = frame.f_code, linecache.getline(frame.f_code.co_filename, line).strip()
+    where = f"{code.co_filename}, line {line}, in {code.co_qualname}: {text}"
+    return UserError(f"{where}: {type(error).__name__}: {error}")

@@ -38,7 +38,7 @@ def read_toml(path: Path, model: type[Model], kind: str, **given: Any) -> Model:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror}); a {kind} is a folder with {path.name}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UserError(f"{path}: not valid TOML: {error}") from None
     try:
         return model.model_validate(given | content)

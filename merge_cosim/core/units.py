@@ -26,6 +26,9 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 AnyArray = NDArray[Any]
 
+SpeedLimit = Annotated[float, Field(gt=0, le=100)]
+"""A speed limit [m/s]; beyond 100 it is a slip."""
+
 Share = Annotated[float, Field(ge=0, le=1)]
 """A parameter that is a share of a whole."""
 

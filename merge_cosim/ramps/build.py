@@ -1,14 +1,21 @@
 """Build a ramp's net from its plain XML."""
 
 import re
-import subprocess
 import tempfile
 from pathlib import Path
 
 import sumolib
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.programs import run_program
+from merge_cosim.core.xml_file import root_element
 from merge_cosim.ramps.definition import read_ramp_file
+
+PLAIN = ("nod", "edg", "con", "tll", "typ")
+"""Kinds of plain XML."""
+
+LIMIT = 900.0
+"""Longest time for netconvert [s]."""
 
 HEAD = re.compile(rb"\A(<\?xml[^>]*\?>)\s*<!--.*?-->\s*", re.DOTALL)
 """Head of a file that one of SUMO's programs has written: it names date, version and command."""
@@ -48,10 +55,14 @@ def netconvert(file: Path, *options: str) -> None:
     Raises:
         UserError: It fails; the line names the file and netconvert's reason.
     """
+    plain = (each for kind in PLAIN for each in file.parent.glob(f"*.{kind}.xml") if file.suffix == ".netccfg")
+    for each in filter(Path.is_file, (file, *plain)):
+        root_element(each)  # netconvert would follow the entities of a document type
     command = [sumolib.checkBinary("netconvert"), *options]
-    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    done = run_program(command, LIMIT, file)
     if done.returncode:
-        lines = [line for line in done.stderr.splitlines() if line.startswith("Error")] or done.stderr.splitlines()
+        said = done.stderr.decode(errors="replace").splitlines()
+        lines = [line for line in said if line.startswith("Error")] or said
         raise UserError(f"{file}: netconvert refuses it: {lines[0] if lines else 'no reason given'}")
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from pydantic import Field, PositiveFloat, model_validator
 
 from merge_cosim.core.toml_file import Table, read_toml
+from merge_cosim.core.units import SpeedLimit
 
 FILE_NAME = "ramp.toml"
 
@@ -67,7 +68,7 @@ class RampFile(Table):
     merging_lane: list[int]
     gore: str
     merging_point: float = Field(ge=0.0)
-    speed_limit: PositiveFloat
+    speed_limit: SpeedLimit
     lengths: dict[str, PositiveFloat] = Field(default_factory=dict)
     extensions: Extensions = Extensions()
     ngsim: NgsimMapping | None = None

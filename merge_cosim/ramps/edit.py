@@ -2,7 +2,6 @@
 
 import os
 import shlex
-import subprocess
 import sys
 import tempfile
 import time
@@ -12,9 +11,13 @@ from pathlib import Path
 import sumolib
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.programs import run_program
 from merge_cosim.ramps.build import HEAD, config, netconvert
 from merge_cosim.ramps.definition import read_ramp_file
 from merge_cosim.ramps.view import netedit_view
+
+DAY = 86_400.0
+"""Longest time for which netedit stays open [s]."""
 
 
 def editor_command(folder: Path) -> list[str]:
@@ -42,7 +45,7 @@ def open_editor(folder: Path, say: Callable[[str], object]) -> None:
     try:
         with tempfile.TemporaryDirectory() as scratch:
             command += netedit_view(folder, Path(scratch))
-            status = subprocess.run(command, cwd=folder, check=False).returncode
+            status = run_program(command, DAY, settings, cwd=folder, captured=False).returncode
     finally:
         # netedit writes a configuration of the same name, with absolute paths and without our options.
         if settings.read_bytes() != kept:

@@ -18,6 +18,7 @@ import sumolib
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
 from merge_cosim.core.units import BoolArray, FloatArray
+from merge_cosim.core.xml_file import root_element
 from merge_cosim.ramps.definition import FILE_NAME, NgsimMapping, RampFile, read_ramp_file
 
 Way = Literal["main", "ramp"]
@@ -222,6 +223,8 @@ def read_net(path: Path) -> sumolib.net.Net:
     """
     if not path.is_file():
         raise UserError(f"{path}: no such net; build it with: merge-cosim ramp build {path.parent}")
+    if (root := root_element(path)).tag != "net":
+        raise UserError(f"{path}: its root is <{root.tag}>, not <net>; give a .net.xml")
     try:
         return sumolib.net.readNet(str(path))
     except Exception as error:  # sumolib passes on whatever its parser meets

@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple, NoReturn, Self
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -18,6 +19,8 @@ import pyarrow.parquet as pq
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.results.schema import KEY, SCHEMA, SCHEMA_VERSION, VERSION_KEY
+from merge_cosim.scoring.tracks import RECORDED
+from merge_cosim.simulation.recording import trace_of
 
 SCENE_FACTS = b"merge_cosim_scenes"
 """Metadata of a part: the facts of the scenes that its rows come from (JSON)."""
@@ -37,6 +40,12 @@ OF_SCENE = ("scenario", "variation", "method", "scene")
 """What names a scene in the tables of scenes."""
 BEFORE = "before"
 """The parts that hold what a reopened folder held begin so."""
+_TRACE = [
+    *(pa.field(name, pa.string()) for name in ("scenario", "case", "method")),
+    *(pa.field(name, pa.float64()) for name in trace_of(np.zeros((RECORDED, 1)), (), 0.0)),
+]
+"""The columns that every record has."""
+
 STRETCH_ROWS = 100_000
 """Rows that are sorted and written at a time; more where more cases lie between each other."""
 
@@ -53,6 +62,18 @@ class _Part(NamedTuple):
         rows = pq.read_table(file, columns=["scenario", "variation", "case"])
         least = {name: pc.min(rows[name]).as_py() for name in rows.column_names}
         return cls(file, (least["scenario"], least["variation"]), least["case"])
+
+
+class _Object(dict[str, Any]):
+    """An object of a JSON file: a key that is looked for and not there is a damage of the file."""
+
+    def of(self, file: Path) -> Self:
+        """Name the file that it comes from."""
+        self._file = file
+        return self
+
+    def __missing__(self, key: str) -> NoReturn:
+        raise UserError(f"{self._file}: damaged (no '{key}'); run the sweep again")
 
 
 class ResultFolder:
@@ -273,7 +294,9 @@ class ResultFolder:
         Raises:
             UserError: They are missing or damaged.
         """
-        return _read_table(self.path / TRACES)
+        records = _read_table(self.path / TRACES)
+        _require(self.path / TRACES, records.schema, _TRACE)
+        return records
 
     def write_json(self, name: str, document: Any) -> None:
         """Write one JSON file of the folder."""
@@ -300,6 +323,7 @@ class ResultFolder:
         version = (rows.schema.metadata or {}).get(VERSION_KEY, b"none").decode()
         if version != SCHEMA_VERSION:
             raise UserError(f"{file}: result schema {version}, expected {SCHEMA_VERSION}; run the sweep again")
+        _require(file, rows.schema, [column for column in SCHEMA if not columns or column.name in columns])
         return rows
 
     def read_json(self, name: str) -> Any:
@@ -354,6 +378,14 @@ def _is_whole(file: Path) -> bool:
     return True
 
 
+def _require(file: Path, held: pa.Schema, expected: Iterable[pa.Field]) -> None:
+    """Refuse a table that lacks a column, has it twice, or with values of another type."""
+    for column in expected:
+        types = [field.type for field in held if field.name == column.name]
+        if types != [column.type] and not (types == [pa.large_string()] and column.type == pa.string()):
+            raise UserError(f"{file}: damaged (no column '{column.name}' of type {column.type}); run the sweep again")
+
+
 def _read_table(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
     try:
         return pq.read_table(file, columns=columns)
@@ -365,10 +397,10 @@ def _read_table(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
 
 def _read_json(file: Path) -> Any:
     try:
-        return json.loads(file.read_text(encoding="utf-8"))
+        return json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=lambda pairs: _Object(pairs).of(file))
     except FileNotFoundError:
         raise UserError(f"{file}: missing; run the sweep again") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
 
 

@@ -11,7 +11,6 @@ from typing import Annotated, Any, Self
 from pydantic import (
     BaseModel,
     Field,
-    PositiveFloat,
     ValidationError,
     model_validator,
 )
@@ -21,6 +20,7 @@ from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
 from merge_cosim.core.registry import did_you_mean, parameters
+from merge_cosim.core.units import SpeedLimit
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ramps.ramp import Way, ramp_names
@@ -64,7 +64,7 @@ class Scenario(Strict):
     sensing: dict[str, Any] = Field(default_factory=dict)
     full_scene: FullScene | None = None
     test: Rules = Rules()
-    speed_limit: PositiveFloat | None = None
+    speed_limit: SpeedLimit | None = None
     host: Way = "main"
     name: str
 
@@ -198,6 +198,8 @@ def _validated(document: dict[str, Any], settings: Mapping[str, Any] | None, whe
         scenario = Scenario.model_validate_json(json.dumps(document, default=_plain), strict=True)
     except ValidationError as error:
         raise UserError(f"{where}: {_first_problem(error)}") from None
+    except RecursionError:
+        raise UserError(f"{where}: its tables are nested too deeply") from None
     except UserError as error:
         raise UserError(f"{where}: {error}") from None
     try:
@@ -212,7 +214,7 @@ def _validated(document: dict[str, Any], settings: Mapping[str, Any] | None, whe
 def _of_toml(file: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UserError(f"{file}: not a TOML file: {error}") from None
 
 

@@ -48,11 +48,17 @@ def split_settings(settings: Mapping[str, Any], own: Iterable[Component] = ()) -
 
 
 def parse_value(text: str) -> Any:
-    """Read a value as TOML does (numbers, true, lists); what is no TOML is a string."""
+    """Read a value as TOML does (numbers, true, lists); what is no TOML is a string.
+
+    Raises:
+        UserError: Lists lie in lists without an end.
+    """
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text
+    except RecursionError:
+        raise UserError(f"{text[:20]}...: its lists are nested too deeply") from None
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

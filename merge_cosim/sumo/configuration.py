@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import gzip
 import math
 import os
-import subprocess
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,7 +13,9 @@ import sumolib
 from lxml import etree
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.programs import run_program
 from merge_cosim.core.registry import did_you_mean
+from merge_cosim.core.xml_file import read_xml
 from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
 from merge_cosim.sumo.vehicle_types import ROLE
 
@@ -24,6 +23,8 @@ DEMAND = ("vehicle", "trip", "flow", "person", "personFlow", "container", "conta
 """Elements that put something into the simulation."""
 TYPES = ("vType", "vTypeDistribution")
 """Elements that say of which kind a vehicle is."""
+READING = 60.0
+"""Longest time for SUMO to read a configuration [s]."""
 DEFAULT_TYPE = "DEFAULT_VEHTYPE"
 """SUMO's own passenger car."""
 
@@ -57,6 +58,7 @@ class Configuration:
         """
         if not file.is_file():
             raise UserError(f"{file}: no such file")
+        read_xml(file)  # SUMO would follow the entities of a document type, perhaps without an end
         options = dict(_options(file.absolute(), file.stat().st_mtime_ns, str(file)))
         nets, routes, additional = (
             tuple(file.parent / os.path.expandvars(name.strip()) for name in options.get(key, "").split(",") if name)
@@ -71,6 +73,7 @@ class Configuration:
             if not each.is_file():
                 raise UserError(f"{file}: {each}: no such file")
         _require_ramp(file, nets[0])
+        _seconds(options.get("step-length", "1"), file)
         end = _seconds(options.get("end", "-1"), file)
         return cls(
             file, nets[0], routes, additional, _seconds(options.get("begin", "0"), file), end if end >= 0 else math.inf
@@ -127,23 +130,23 @@ class Configuration:
             yield from parse(file).iter(*tags)
 
 
-def parse(file: Path) -> etree._Element:
+def parse(file: Path, parents: tuple[Path, ...] = ()) -> etree._Element:
     """Root of an XML file, which may be compressed with gzip; files that it includes stand in their places.
 
+    Args:
+        file: The file.
+        parents: The files that include it.
+
     Raises:
-        UserError: A file is missing or no XML.
+        UserError: A file cannot be read (see `read_xml`), or includes itself.
     """
-    try:
-        content = gzip.decompress(file.read_bytes()) if file.suffix == ".gz" else file.read_bytes()
-        root = etree.fromstring(content, etree.XMLParser(huge_tree=True))
-    except FileNotFoundError:
-        raise UserError(f"{file}: no such file") from None
-    except (etree.XMLSyntaxError, OSError, EOFError, zlib.error) as error:
-        raise UserError(f"{file}: not XML: {error}") from None
+    if file in parents:
+        raise UserError(f"{file}: it includes itself")
+    root = read_xml(file)
     for include in list(root.iter("include")):
         parent = include.getparent()
         if parent is not None:
-            parent.replace(include, parse(file.parent / include.get("href", "")))
+            parent.replace(include, parse(file.parent / include.get("href", ""), (*parents, file)))
     return root
 
 
@@ -162,7 +165,7 @@ def _options(file: Path, changed: int, named: str) -> tuple[tuple[str, str], ...
     """
     # SUMO runs beside the file, so that relative names come back as they stand there.
     command = [sumolib.checkBinary("sumo"), "-c", file.name, "--save-configuration", "-"]
-    done = subprocess.run(command, cwd=file.parent, capture_output=True, check=False)
+    done = run_program(command, READING, Path(named), cwd=file.parent)
     if done.returncode:
         lines = done.stderr.decode(errors="replace").splitlines()
         reason = " ".join(line.removeprefix("Error: ").strip() for line in lines if "Quitting" not in line)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import re
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT
+
+_END = 200
+"""Bytes at the end of a file in which its last tag is looked for."""
 
 DECIMALS = 6
 """Digits after the point in these files, as in the record of every cycle; SUMO's own default is 2."""
@@ -61,6 +66,8 @@ class SumoOutputs:
             target = file.resolve()
             if target in targets:
                 raise UserError(f"{file}: two of SUMO's outputs are to be written to it; give each a file of its own")
+            if target.exists() and not (target.is_file() or target.is_dir()):
+                raise UserError(f"{file}: is no ordinary file; SUMO's output cannot be checked there")
             if ":" in str(target)[2:]:  # after a drive's letter
                 raise UserError(f"{file}: SUMO takes a name with a colon for a network port; leave it out")
             targets.append(target)
@@ -69,3 +76,15 @@ class SumoOutputs:
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(b"")  # SUMO's own complaint would name the net
         return (*options, "--precision", str(DECIMALS)) if options else ()
+
+    def check(self) -> None:
+        """Make sure that the files are whole, after the simulation was closed: SUMO says nothing of a full disk.
+
+        Raises:
+            UserError: One is not.
+        """
+        for file in filter(None, astuple(self)):
+            with file.open("rb") as content:
+                content.seek(-min(_END, file.stat().st_size), os.SEEK_END)
+                if not re.search(rb"(</[\w-]+>|/>)\s*\Z", content.read()):
+                    raise UserError(f"{file}: SUMO could not write it to its end; is the disk full?")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -14,8 +13,13 @@ from typing import Any
 import sumolib
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.programs import run_program
+from merge_cosim.core.units import HOUR
 from merge_cosim.sumo.options import SumoOptions
 from merge_cosim.sumo.session import Session
+
+LONGEST_RUN = 4 * HOUR
+"""Longest time for a SUMO that runs to its end by itself [s]; a recording of the surrogate takes a minute."""
 
 _NO_REASON = "Process Error"
 """What libsumo raises where it has told the reason elsewhere."""
@@ -82,9 +86,9 @@ def run_sumo(options: SumoOptions) -> None:
         UserError: It fails; the line begins with the file that it is started with.
     """
     command: Sequence[str] = [sumolib.checkBinary("sumo"), *options.arguments()]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run_program(command, LONGEST_RUN, options.file)
     if done.returncode:
-        reason = (done.stderr.strip() or "no reason given").splitlines()[0]
+        reason = (done.stderr.decode(errors="replace").strip() or "no reason given").splitlines()[0]
         raise UserError(f"{options.file}: SUMO fails on it: {reason}")
 
 

@@ -1,6 +1,5 @@
 """Many copies of a ramp side by side in one net, so that one SUMO steps a batch of encounters."""
 
-import gzip
 import hashlib
 from copy import deepcopy
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 from lxml import etree
 
 from merge_cosim.core.files import cache_folder, from_cache
+from merge_cosim.core.xml_file import read_xml
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.sumo.xml import write_xml
 
@@ -42,8 +42,7 @@ def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
     target = cache_folder("tiles") / f"{ramp.name}-{count}-{key}.net.xml"
 
     def make(file: Path) -> None:
-        text = gzip.decompress(source) if ramp.net.suffix == ".gz" else source
-        net = etree.fromstring(text, etree.XMLParser(remove_blank_text=True, remove_comments=True))
+        net = read_xml(ramp.net, blanks=False)
         _leave_out_internal(net)
         if not whole:
             _reduce(net, ramp)

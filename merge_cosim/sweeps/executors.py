@@ -185,6 +185,7 @@ def interrupts_ignored() -> Iterator[None]:
 def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
     """What a worker process does: run what comes through the pipe, until that is empty or closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the employer decides what an interrupt means
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if inherited is not None:
         inherited.close()  # else the worker would never see that the employer has gone
     worker_session = WorkerSession()

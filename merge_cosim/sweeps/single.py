@@ -56,6 +56,7 @@ def trace_case(
             ((run, facts),) = task.runs(session, options, traced=Everything())
     finally:
         session.close()
+    outputs.check()
     rows = {row["case"]: row for row in task.rows(run).to_pylist()}
     if case in rows:
         return rows[case], run.traces[case].assign(case=case)

@@ -9,6 +9,7 @@ from typing import Self
 import pyarrow as pa
 
 from merge_cosim.core.observation import Setting
+from merge_cosim.core.registry import plugin_error
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
@@ -94,12 +95,21 @@ class Task:
         return replace(self, cases=self.cases.take(rows))
 
     def run(self, worker_session: WorkerSession) -> tuple[pa.Table, Effort]:
-        """Simulate the cases; returns their result rows and what they cost."""
+        """Simulate the cases; returns their result rows and what they cost.
+
+        Raises:
+            UserError: A component of a plugin has raised something.
+        """
         effort, tables, facts = Effort(), [], []
-        for run, found in self.runs(worker_session):
-            effort.add(run.effort)
-            tables.append(self.rows(run))
-            facts += [{**self.names, **fact} for fact in found]
+        try:
+            for run, found in self.runs(worker_session):
+                effort.add(run.effort)
+                tables.append(self.rows(run))
+                facts += [{**self.names, **fact} for fact in found]
+        except Exception as error:
+            if told := plugin_error(error):
+                raise told from error
+            raise
         return with_scene_facts(pa.concat_tables(tables), facts), effort
 
     def runs(

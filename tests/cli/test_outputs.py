@@ -12,10 +12,12 @@ from pathlib import Path
 import pytest
 import sumo
 import sumolib
-from command import merge_cosim, refused
+from command import merge_cosim, refused, run_process
 
+from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.sumo.lane_map import LaneMap, LanePosition
+from merge_cosim.sumo.outputs import SumoOutputs
 from merge_cosim.sweeps.plan import SweepRequest, plan
 
 OUTPUTS = ("fcd", "ssm", "lanechange", "tripinfo", "collisions")
@@ -226,6 +228,7 @@ def test_a_window_writes_the_same(tmp_path):
     [
         (("--fcd", "file/x.xml"), "file: cannot be"),
         (("--ssm", "folder"), "folder: cannot be"),
+        (("--fcd", "/dev/full"), "/dev/full: is no ordinary file"),
         (("--fcd", "a.xml", "--ssm", "./a.xml"), "a.xml: two of SUMO's outputs"),
         (("--tripinfo", "a:b.xml"), "a:b.xml: SUMO takes a name with a colon"),
     ],
@@ -244,3 +247,20 @@ def test_the_logged_host_is_not_driven_in_sumo(tmp_path):
     line = refused("run", "us101-replay", *arguments, cwd=tmp_path)
     assert line.startswith("merge-cosim: SUMO's outputs: the method 'human' is the log itself")
     assert not (tmp_path / "x.xml").exists()
+
+
+def test_an_output_that_sumo_could_not_write_to_its_end(tmp_path):
+    file = tmp_path / "fcd.xml"
+    for whole in ("<fcd-export>\n</fcd-export>\n", '<?xml version="1.0"?>\n<collisions/>'):
+        file.write_text(whole)
+        SumoOutputs(fcd=file).check()
+    for cut in ("", '<fcd-export>\n <timestep time="0.1">\n  <vehicle id="t0.ho'):
+        file.write_text(cut)
+        with pytest.raises(UserError, match=r"fcd\.xml: SUMO could not write it to its end; is the disk full\?"):
+            SumoOutputs(fcd=file).check()
+
+
+def test_a_variable_that_turns_traci_into_libsumo_changes_nothing(tmp_path):
+    words = ("run", "designed-2", "--case", "d+1_h15_m14", "--method", "acc", "--json")
+    done = run_process(*words, cwd=tmp_path, LIBSUMO_AS_TRACI="1")
+    assert json.loads(done.stdout)["case"] == "d+1_h15_m14", done.stderr

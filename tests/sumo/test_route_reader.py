@@ -8,6 +8,7 @@ import pytest
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
+from merge_cosim.ramps.build import build
 from merge_cosim.ramps.create.new import RampNumbers, new_ramp
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.sumo.configuration import Configuration
@@ -28,6 +29,13 @@ CONFIG = """<configuration>
 <input><net-file value="mine/designed.net.xml"/><route-files value="my.rou.xml"/></input>
 </configuration>
 """
+
+BOMB = (
+    '<!DOCTYPE c [<!ENTITY a "0123456789">'
+    + "".join(f'<!ENTITY {chr(b + 1)} "{f"&{chr(b)};" * 10}">' for b in range(97, 107))
+    + ']><configuration a="&k;">'
+)
+"""An attribute of 100 GB."""
 
 
 def write(folder, routes=ROUTES, config=CONFIG):
@@ -126,15 +134,34 @@ def test_mistakes_in_routes_are_named(tmp_path, old, new, expected):
         ("my.rou.xml", "other.rou.xml", r"my\.sumocfg: .*other\.rou\.xml: no such file"),
         ("net-file", "net-fil", r"my\.sumocfg: SUMO cannot read it: No option with the name 'net-fil' exists"),
         ('<net-file value="mine/designed.net.xml"/>', "", r"my\.sumocfg: no <net-file"),
-        ("</configuration>", "", r"my\.sumocfg: SUMO cannot read it: .*ended"),
+        ("</configuration>", "", r"my\.sumocfg: not XML: Premature end of data"),
         ("</input>", '<mesosim value="true"/></input>', r"mesosim"),
         ("</input>", '<end value="soon"/></input>', r"my\.sumocfg: 'soon' is no time"),
+        ("</input>", '<step-length value="é"/></input>', r"my\.sumocfg: 'é' is no time"),
+        ("<configuration>", BOMB, r"my\.sumocfg: it has a document type"),
     ],
 )
 def test_mistakes_in_the_configuration_are_named(tmp_path, old, new, expected):
     assert old in CONFIG
     with pytest.raises(UserError, match=expected):
         read_sumocfg(write(tmp_path, config=CONFIG.replace(old, new)))
+
+
+def test_document_types_and_circles_in_further_files(tmp_path):
+    file = write(tmp_path, BOMB.replace("configuration", "routes") + "</routes>")
+    with pytest.raises(UserError, match=r"my\.rou\.xml: it has a document type"):
+        read_sumocfg(file)
+    (tmp_path / "my.rou.xml").write_text('<routes><include href="my.rou.xml"/></routes>')
+    with pytest.raises(UserError, match=r"my\.rou\.xml: it includes itself"):
+        read_sumocfg(file)
+    net = tmp_path / "mine" / "mine.net.xml"
+    net.write_text(BOMB.replace("configuration", "net") + "</net>")
+    with pytest.raises(UserError, match=r"mine\.net\.xml: it has a document type"):
+        Ramp.load(tmp_path / "mine")
+    nodes = tmp_path / "mine" / "mine.nod.xml"
+    nodes.write_text(BOMB.replace("configuration", "nodes") + "</nodes>")
+    with pytest.raises(UserError, match=r"mine\.nod\.xml: it has a document type"):
+        build(tmp_path / "mine")
 
 
 def test_a_net_without_a_ramp_says_how_to_get_one(tmp_path):

@@ -98,7 +98,7 @@ class Deadly(Estimator):
         list(Processes(2, [plugin]).run(queue))
 
 
-def test_an_error_in_a_worker_is_raised_here(tmp_path, own_registry):
+def test_an_error_of_a_plugin_in_a_worker_names_its_line(tmp_path, own_registry):
     plugin = tmp_path / "faulty.py"
     plugin.write_text(
         """
@@ -115,9 +115,10 @@ class Faulty(Estimator):
 """
     )
     request = SweepRequest(["designed-random"], ["faulty"], settings=CASES, plugins=[plugin])
-    with pytest.raises(ZeroDivisionError) as raised:
+    with pytest.raises(UserError) as raised:
         list(Processes(2, [plugin]).run(ChunkQueue(cut(plan(request), 60))))
-    assert f'File "{plugin}", line 11, in update' in raised.value.__notes__[0]
+    fault = "line 11, in Faulty.update: return 1 / 0: ZeroDivisionError: division by zero"
+    assert str(raised.value) == f"{plugin}, {fault}"
 
 
 def test_no_fork_beside_threads():

@@ -148,7 +148,7 @@ class IntentionModel:
             if not ((model.pairs > 0).all() and (model.arrivals.shares.sum(axis=(1, 2)) > 0).all()):
                 raise ValueError("one intention has no pairs or no arrivals")
             return model
-        except (ValueError, LookupError, TypeError, AttributeError) as error:
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
             raise UserError(f"{file}: not a merge-cosim model ({error!r}); make one with 'merge-cosim train'") from None
 
 

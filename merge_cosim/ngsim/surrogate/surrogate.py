@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import cache_folder, from_cache
+from merge_cosim.core.programs import end_programs
 from merge_cosim.ngsim.sites import Site
 from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ngsim.surrogate.ngsim_format import ngsim_rows
@@ -77,7 +78,11 @@ def generate(recipe: Recipe, ramp: Ramp, target: Path) -> None:
             return ngsim_rows(run, recipe, ramp, site, recording)
 
     with ThreadPoolExecutor(PROCESSES) as pool:
-        table = pa.concat_tables(pool.map(record, range(len(recipe.seeds))))
+        try:
+            table = pa.concat_tables(pool.map(record, range(len(recipe.seeds))))
+        except BaseException:  # an interrupt, too: the pool waits for its threads, and they for SUMO
+            end_programs()
+            raise
     raw = pa.array(np.zeros(table.num_rows, dtype=bool))
     source = pa.array([f"surrogate: SUMO {version('eclipse-sumo')}"] * table.num_rows)
     table = table.append_column("source", source).append_column("smoothed", raw)

@@ -1,0 +1,64 @@
+"""Running other programs (SUMO's): each with a time limit, in a process group of its own, and ended with this one."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from merge_cosim.core.errors import UserError
+
+_running: set[subprocess.Popen[bytes]] = set()
+
+
+def run_program(
+    command: Sequence[str], seconds: float, file: Path, cwd: Path | None = None, captured: bool = True
+) -> subprocess.CompletedProcess[bytes]:
+    """Run a program to its end; whatever ends the wait for it ends it and what it has started.
+
+    Args:
+        command: The program and its arguments.
+        seconds: Time limit [s].
+        file: What it works on, for the line about a limit that is passed.
+        cwd: The folder to run it in.
+        captured: Keep what it prints; else it prints where this process does.
+
+    Raises:
+        UserError: It cannot be started, or takes too long.
+    """
+    pipe = subprocess.PIPE if captured else None
+    try:
+        process = subprocess.Popen(
+            command, cwd=cwd, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, start_new_session=True
+        )
+    except OSError as error:
+        raise UserError(f"{command[0]}: cannot be started ({error.strerror})") from None
+    _running.add(process)
+    try:
+        output, errors = process.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        name = Path(command[0]).name
+        raise UserError(f"{file}: {name} was still at it after {seconds:g} s and was ended; is it damaged?") from None
+    finally:
+        _end(process)
+        _running.discard(process)
+    return subprocess.CompletedProcess(command, process.returncode, output or b"", errors or b"")
+
+
+def end_programs() -> None:
+    """End every program that runs, as when this process is told to end."""
+    for process in tuple(_running):
+        _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a program and its children, which is nothing if it has ended."""
+    if process.poll() is not None:
+        return
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
+    process.wait()
