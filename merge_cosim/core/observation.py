@@ -1,10 +1,12 @@
 """What the host observes in one cycle, and the setting of a run: the input of estimators and controllers."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from merge_cosim.core.units import DT, TOLERANCE, BoolArray, FloatArray, time_to_arrival
+from merge_cosim.core.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray, time_to_arrival
 
 DECIMALS = 6
 """What is observed is rounded to 1e-6 m and m/s: the designed grid is full of ties that the last bits would break."""
@@ -39,6 +41,10 @@ class Observation:
     merging_speed: FloatArray
     host_length: FloatArray
     merging_length: FloatArray
+
+    def take(self, rows: IntArray) -> Observation:
+        """The chosen encounters, in that order."""
+        return Observation(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     @property
     def host_arrival(self) -> FloatArray:

@@ -186,11 +186,19 @@ class GivenWorld(World):
         self._keys = stream_keys(encounters.case, seed)
         self._score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
         self._queue = np.argsort(-expected_cycles(encounters, rules), kind="stable")
-        self._free = np.arange(self.slots)
         self._ever_collided = np.zeros(n, dtype=bool)
-        self._case[:] = -1
-        self._active = 0
+        self.restart()
         self.worst_difference_m = 0.0
+
+    def restart(self) -> None:
+        """Free all slots, whatever runs there."""
+        self._case[:] = -1
+        self._free = np.arange(self.slots)
+        self._active = 0
+
+    def line_up(self, cases: IntArray) -> None:
+        """Let these encounters begin next, which may have run before, and no others; shape (m,)."""
+        self._queue = cases
 
     @property
     def encounters(self) -> Encounters:

@@ -1,0 +1,22 @@
+"""Gymnasium environments: `import merge_cosim.gym` registers `merge_cosim/Merge-v0`.
+
+The package `gymnasium` is needed: `pip install merge-cosim[gym]`.
+"""
+
+try:
+    import gymnasium
+except ImportError as error:
+    raise ImportError("merge_cosim.gym needs Gymnasium: pip install 'merge-cosim[gym]'") from error
+
+from merge_cosim.gym.settings import Options, Reward
+
+NAME = "merge_cosim/Merge-v0"
+"""What `gymnasium.make` and `gymnasium.make_vec` know the environment by."""
+
+gymnasium.register(
+    NAME,
+    entry_point="merge_cosim.gym.env:MergeEnv",
+    vector_entry_point="merge_cosim.gym.vector:MergeVectorEnv",
+)
+
+__all__ = ["NAME", "Options", "Reward"]
