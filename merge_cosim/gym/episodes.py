@@ -162,8 +162,7 @@ class Episodes(Loop):
     @property
     def time(self) -> FloatArray:
         """Time since each encounter began [s], shape (slots,)."""
-        passed: FloatArray = self._age * DT
-        return passed
+        return self._age.astype(np.float64) * DT
 
     @property
     def bounds(self) -> tuple[float, float]:
