@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from merge_cosim.bench.loops import compare, highway
 from merge_cosim.bench.scaling import scaling
@@ -15,7 +15,11 @@ from merge_cosim.bench.scenes import METHOD as SCENE_METHOD
 from merge_cosim.bench.scenes import SCENARIO as SCENE_SCENARIO
 from merge_cosim.bench.scenes import scene_costs
 from merge_cosim.bench.updates import estimator_costs
+from merge_cosim.bench.worlds import SCENARIO as WORLD_SCENARIO
+from merge_cosim.bench.worlds import world_costs
 from merge_cosim.sweeps.identity import versions
+
+T = TypeVar("T")
 
 HEAD = """# Bench
 
@@ -27,8 +31,10 @@ How fast merge-cosim is on one machine, made by
 
 on {date}: {machine}.
 
-{load}Times are wall times; loops, estimators and sweeps take turns, and the median of {rounds} is shown.
-Absolute times swing with what else the machine does; ratios of one run hold better.
+{load}
+Times are wall times, unless processor time (`cpu`) is named; loops, estimators and sweeps take turns, and the
+median of {rounds} is shown. Absolute times swing with what else the machine does, wall times most; ratios of processor
+times of one run hold best.
 """
 LOOPS = """## One process against SUMO's bare steps, and against the obvious alternatives
 
@@ -37,9 +43,14 @@ times steps. The alternatives are in `tools/bench/`: they make the same decision
 if one of their outcomes differs from ours. `scalar` keeps one libsumo and adds and removes each case's cars, `restart`
 starts SUMO for every case, `traci` talks to one sumo over a socket (the wait for the connection is not counted).
 """
+WORLDS = """## SUMO and the closed form
+
+Processor time per vehicle and step [us] by method in one process, scoring and result rows included: `{scenario}` in
+SUMO ({cases} cases), and with `--world closed-form` (all cases).
+"""
 UPDATES = """## One update of each estimator
 
-Microseconds per encounter, in a full batch and alone.
+Processor time per encounter [us], in a full batch and alone.
 """
 SCENES = """## Living traffic
 
@@ -74,18 +85,40 @@ def bench(
     """
     several = jobs or os.cpu_count() or 1
     sizes = sorted({max(1, largest // 100), max(1, largest // 10), largest})
+    loads: dict[str, float | None] = {}
+
+    def watched(part: str, take: Callable[[], T]) -> T:
+        before, taken = load(), take()
+        loads[part] = max((one for one in (before, load()) if one is not None), default=None)
+        return taken
+
     return {
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "machine": machine(),
         "versions": versions(),
         "rounds": rounds,
-        **compare(cases, sample, rounds),
-        "highway_env": highway(),
-        "estimators": estimator_costs(rounds),
+        **watched("loops", lambda: compare(cases, sample, rounds)),
+        "highway_env": watched("highway_env", highway),
+        "worlds": watched("worlds", lambda: world_costs(cases, rounds)),
+        "estimators": watched("estimators", lambda: estimator_costs(rounds)),
         "copies": copies,
-        "scenes": scene_costs(copies),
-        "scaling": scaling(sizes, sorted({1, several}), rounds),
+        "scenes": watched("scenes", lambda: scene_costs(copies)),
+        "scaling": watched("scaling", lambda: scaling(sizes, sorted({1, several}), rounds)),
+        "load": loads,
     }
+
+
+def load() -> float | None:
+    """The machine's load of the last minute; None where the system does not say."""
+    return round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None
+
+
+def crowded(found: Mapping[str, Any], part: str) -> str:
+    """A mark for a part of the figures during which the load exceeded the cores; empty if it did not."""
+    seen, cores = found["load"][part], found["machine"]["cores"]
+    if seen is None or seen <= cores:
+        return ""
+    return f"**The load rose to {seen} on {cores} cores: wall times of this part are too long.**\n"
 
 
 def machine() -> dict[str, Any]:
@@ -95,7 +128,7 @@ def machine() -> dict[str, Any]:
         "cores": os.cpu_count(),
         "memory_gib": _memory_gib(),
         "system": f"{platform.system()} {platform.machine()}",
-        "load_before": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
+        "load_before": load(),
     }
 
 
@@ -104,24 +137,26 @@ def page(found: Mapping[str, Any], command: str) -> str:
     where = found["machine"]
     described = f"{where['processor']}, {where['cores']} cores, {where['memory_gib']} GiB, {where['system']}"
     versions_used = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
-    loops = [{"loop": "ours", "us per vehicle and step": found["us_per_vehicle_step"], "ours is faster by": ""}]
-    loops += [
+    loops = [
         {
-            "loop": name,
-            "us per vehicle and step": found[f"{name}_us_per_vehicle_step"],
-            "ours is faster by": found[f"speedup_vs_{name}"],
+            "loop": name or "ours",
+            "us per vehicle and step": found["_".join(filter(None, (name, "us_per_vehicle_step")))],
+            "cpu us": found["_".join(filter(None, (name, "cpu_us_per_vehicle_step")))],
+            "ours is faster by": found.get(f"speedup_vs_{name}", ""),
+            "by cpu": found.get(f"cpu_speedup_vs_{name}", ""),
         }
-        for name in ("scalar", "restart", "traci")
+        for name in ("", "scalar", "restart", "traci")
     ]
-    load = where["load_before"]
+    before = where["load_before"]
     parts = [
         HEAD.format(
             command=command,
             machine=f"{described}; {versions_used}",
-            load="" if load is None else f"Load of the machine before the start: {load} (0: nothing else ran). ",
+            load="" if before is None else f"Load of the machine before the start: {before} (0: nothing else ran).",
             **_only(found, "date", "rounds"),
         ),
         LOOPS.format(**_only(found, "cases", "scenario", "method", "sample")),
+        crowded(found, "loops"),
         _table(loops),
         f"Ours: {found['vehicle_steps_per_s']:,} vehicle-steps per second; wall time over the time inside "
         f"`simulationStep` of the same run: **{found['ratio_to_bare_sumo']}**.\n",
@@ -130,14 +165,17 @@ def page(found: Mapping[str, Any], command: str) -> str:
         theirs = found["highway_env"]
         parts.append(
             f"For scale, another simulator with other models: `merge-v0` of highway-env {theirs['version']} makes "
-            f"{theirs['steps_per_s']:,} simulated steps, {theirs['vehicle_steps_per_s']:,} vehicle-steps, per second.\n"
+            f"{theirs['steps_per_s']:,} simulated steps, {theirs['vehicle_steps_per_s']:,} vehicle-steps, per second "
+            f"({theirs['vehicle_steps_per_cpu_s']:,} vehicle-steps per second of processor time).\n"
         )
-    parts += [UPDATES, _table(found["estimators"])]
+    parts += [WORLDS.format(scenario=WORLD_SCENARIO, cases=found["cases"]), crowded(found, "worlds")]
+    parts += [_table(found["worlds"]), UPDATES, crowded(found, "estimators"), _table(found["estimators"])]
     parts += [
         SCENES.format(scenario=SCENE_SCENARIO, method=SCENE_METHOD, copies=found["copies"]),
+        crowded(found, "scenes"),
         _table(found["scenes"]),
     ]
-    parts += [SCALING, _table(found["scaling"])]
+    parts += [SCALING, crowded(found, "scaling"), _table(found["scaling"])]
     largest = found["scaling"][-1]
     for alone in found["scaling"]:
         if alone["cases"] == largest["cases"] and alone is not largest:
@@ -146,7 +184,7 @@ def page(found: Mapping[str, Any], command: str) -> str:
                 f"{alone['run_s'] / largest['run_s']:.2f} times as fast as {alone['processes']} by `run_s`, and "
                 f"{alone['wall_s'] / largest['wall_s']:.2f} times with planning and summing up, done by one.\n"
             )
-    return "\n".join(parts)
+    return "\n".join(filter(None, parts))
 
 
 def write_page(file: Path, found: Mapping[str, Any], command: str) -> None:

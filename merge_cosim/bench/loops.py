@@ -39,10 +39,12 @@ class Timing:
 
     Attributes:
         us_per_vehicle_step: Wall time per vehicle and step [us].
+        cpu_us: Processor time per vehicle and step [us].
         failed: Outcome of each case, where the loop has our cases.
     """
 
     us_per_vehicle_step: float
+    cpu_us: float
     failed: tuple[bool, ...] = ()
 
 
@@ -72,7 +74,9 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
                 timings[name].append(timing)
         worker_session.close()
     own = median(1e6 * effort.wall_s / effort.vehicle_steps for effort in efforts)
+    own_cpu = median(1e6 * effort.cpu_s / effort.vehicle_steps for effort in efforts)
     theirs = {name: median(one.us_per_vehicle_step for one in each) for name, each in timings.items()}
+    their_cpu = {name: median(one.cpu_us for one in each) for name, each in timings.items()}
     return {
         "scenario": SCENARIO,
         "method": METHOD,
@@ -80,9 +84,12 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
         "sample": sample,
         "vehicle_steps_per_s": round(1e6 / own),
         "us_per_vehicle_step": round(own, 3),
+        "cpu_us_per_vehicle_step": round(own_cpu, 3),
         "ratio_to_bare_sumo": round(median(effort.wall_s / effort.step_s for effort in efforts), 3),
         **{f"{name}_us_per_vehicle_step": round(time, 3) for name, time in theirs.items()},
+        **{f"{name}_cpu_us_per_vehicle_step": round(time, 3) for name, time in their_cpu.items()},
         **{f"speedup_vs_{name}": round(time / own, 2) for name, time in theirs.items()},
+        **{f"cpu_speedup_vs_{name}": round(time / own_cpu, 2) for name, time in their_cpu.items()},
     }
 
 
@@ -95,6 +102,7 @@ def highway() -> dict[str, Any] | None:
         "version": version("highway-env"),
         "steps_per_s": round(found["steps"] / found["wall_s"], 1),
         "vehicle_steps_per_s": round(found["vehicle_steps"] / found["wall_s"], 1),
+        "vehicle_steps_per_cpu_s": round(found["vehicle_steps"] / found["cpu_s"], 1),
     }
 
 
@@ -130,7 +138,8 @@ def _described(task: Task) -> dict[str, Any]:
 
 def _run_script(script: str, task: Path) -> Timing:
     found = _json_of(script, str(task))
-    return Timing(1e6 * found["wall_s"] / found["vehicle_steps"], tuple(found["failed"]))
+    steps = found["vehicle_steps"]
+    return Timing(1e6 * found["wall_s"] / steps, 1e6 * found["cpu_s"] / steps, tuple(found["failed"]))
 
 
 def _json_of(script: str, *arguments: str) -> Any:

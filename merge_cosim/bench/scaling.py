@@ -22,7 +22,7 @@ def scaling(sizes: Sequence[int], processes: Sequence[int], rounds: int) -> list
 
     Returns:
         A row per size and number, that of the run with the median `run_s`: wall time, its parts, time per case [ms],
-        and the largest process's peak memory [MiB].
+        processor time of the whole command, and the largest process's peak memory [MiB].
     """
     runs: dict[tuple[int, int], list[dict[str, Any]]] = {(cases, jobs): [] for cases in sizes for jobs in processes}
     for _ in range(rounds):
@@ -52,6 +52,7 @@ def _sweep(cases: int, jobs: int) -> dict[str, Any]:
         "run_s": manifest["run_s"],
         "store_s": manifest["store_s"],
         "ms_per_case": round(1e3 * manifest["run_s"] / cases, 3),
+        "cpu_s": round(used.ru_utime + used.ru_stime, 1),
         "loop_ms_per_case": round(1e3 * manifest["loop_s"] / cases, 3),
         "peak_mib": round(used.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from statistics import median
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ CYCLES = 60
 
 
 def estimator_costs(rounds: int) -> list[dict[str, Any]]:
-    """Time of one update per encounter [us], median over `rounds` rounds in which the estimators take turns."""
+    """Processor time of an update per encounter [us], median over `rounds` rounds; the estimators take turns."""
     model = IntentionModel.load(default_model("ngsim"))
     names = estimators.names()
     times: dict[tuple[str, int], list[float]] = {(name, count): [] for name in names for count in (TILES, 1)}
@@ -59,7 +59,7 @@ def _update_us(estimator: Estimator, count: int) -> float:
         Observation(station[0], speed[0], station[1], speed[1], length, length)
         for station, speed in zip(stations, speeds, strict=True)
     ]
-    begin = perf_counter()
+    begin = process_time()
     for one in seen:
         estimator.update(one)
-    return 1e6 * (perf_counter() - begin) / (CYCLES * count)
+    return 1e6 * (process_time() - begin) / (CYCLES * count)

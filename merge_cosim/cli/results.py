@@ -173,6 +173,9 @@ def bench(
     )
     if jobs is not None:
         command += f" --jobs {jobs}"
+    for part in found["load"]:
+        if crowded := figures.crowded(found, part):
+            typer.echo(f"{part}: {crowded.strip().strip('*')}", err=True)
     if page is not None:
         figures.write_page(page, found, command)
     if json:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container
 from dataclasses import dataclass, field, replace
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 import pandas as pd
@@ -33,6 +33,7 @@ class Effort:
         vehicle_steps: Vehicles times steps of running encounters.
         encounter_cycles: Cycles of running encounters.
         wall_s: Time in the loop [s].
+        cpu_s: Processor time in the loop [s].
         step_s: Of it, inside the steps of SUMO [s].
         method_s: Of it, in estimating and controlling [s].
         scene_s: Simulated time of scenes [s].
@@ -42,6 +43,7 @@ class Effort:
     vehicle_steps: int = 0
     encounter_cycles: int = 0
     wall_s: float = 0.0
+    cpu_s: float = 0.0
     step_s: float = 0.0
     method_s: float = 0.0
     scene_s: float = 0.0
@@ -52,6 +54,7 @@ class Effort:
         self.vehicle_steps += other.vehicle_steps
         self.encounter_cycles += other.encounter_cycles
         self.wall_s += other.wall_s
+        self.cpu_s += other.cpu_s
         self.step_s += other.step_s
         self.method_s += other.method_s
         self.scene_s += other.scene_s
@@ -147,14 +150,14 @@ class Loop:
 
     def run(self) -> Run:
         """Run to the end."""
-        begin = perf_counter()
+        begin, cpu = perf_counter(), process_time()
         self._begin()
         while self._world.goes_on:
             self.before_step()
             self._world.step()
             self.after_step()
         run = self.finish()
-        run.effort.wall_s = perf_counter() - begin
+        run.effort.wall_s, run.effort.cpu_s = perf_counter() - begin, process_time() - cpu
         return run
 
     def before_step(self) -> None:

@@ -152,6 +152,7 @@ def sweep(
         "run_s": round(run_s, 3),
         "store_s": round(perf_counter() - ran, 3),
         "loop_s": round(effort.wall_s, 3),
+        "loop_cpu_s": round(effort.cpu_s, 3),
         "step_s": round(effort.step_s, 3),
         "vehicle_steps": effort.vehicle_steps,
         "vehicle_steps_per_s": round(effort.vehicle_steps / run_s) if effort.vehicle_steps else None,

@@ -6,10 +6,11 @@ import pytest
 from command import merge_cosim
 
 from merge_cosim.bench import loops
-from merge_cosim.bench.bench import machine
+from merge_cosim.bench.bench import crowded, machine
 from merge_cosim.bench.scaling import scaling
 from merge_cosim.bench.scenes import MODELS
 from merge_cosim.bench.updates import estimator_costs
+from merge_cosim.bench.worlds import METHODS
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.base import estimators
 from merge_cosim.sweeps.worker_session import WorkerSession
@@ -45,7 +46,10 @@ def test_every_figure_is_there_and_on_the_page(tmp_path):
     ]
     assert [row["model"] for row in found["scenes"]] == list(MODELS)
     assert all(row["real_time_factor"] > 0 and row["meetings"] > 0 for row in found["scenes"])
-    assert all(row["peak_mib"] > 50 for row in found["scaling"])
+    assert all(row["peak_mib"] > 50 and row["cpu_s"] > 0 for row in found["scaling"])
+    assert [row["method"] for row in found["worlds"]] == list(METHODS)
+    assert all(0 < row["closed_form_cpu_us"] < row["sumo_cpu_us"] for row in found["worlds"])
+    assert set(found["load"]) >= {"loops", "worlds", "estimators", "scenes", "scaling"}
     assert found["machine"]["processor"] == machine()["processor"]
     page = (tmp_path / "bench.md").read_text()
     alone, both = found["scaling"][-2:]
@@ -60,11 +64,17 @@ def test_outcomes_are_compared_case_by_case(monkeypatch):
 
     def one_wrong(script, task):
         timing = real(script, task)
-        return loops.Timing(timing.us_per_vehicle_step, (not timing.failed[0], *timing.failed[1:]))
+        return loops.Timing(timing.us_per_vehicle_step, timing.cpu_us, (not timing.failed[0], *timing.failed[1:]))
 
     monkeypatch.setattr(loops, "_run_script", one_wrong)
     with pytest.raises(UserError, match=r"scalar\.py finds other failures than ours"):
         loops.compare(200, 20, 1)
+
+
+def test_a_part_under_too_much_load_is_marked():
+    found = {"machine": {"cores": 2}, "load": {"loops": 2.0, "worlds": 2.1, "scenes": None}}
+    assert (crowded(found, "loops"), crowded(found, "scenes")) == ("", "")
+    assert "load rose to 2.1 on 2 cores" in crowded(found, "worlds")
 
 
 def test_a_sweep_that_fails_ends_the_bench():

@@ -8,6 +8,7 @@ The task is a JSON file written by `merge-cosim bench`: the net, the routes, the
 """
 
 import json
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -106,8 +107,13 @@ def main(run: Callable[[Any, list[Any]], tuple[list[tuple[bool, int]], float]]) 
         run: Takes the task and its cases; returns each case's outcome, and a time [s] that is not to be counted.
     """
     task = json.loads(Path(sys.argv[1]).read_text(), object_hook=lambda values: SimpleNamespace(**values))
-    begin = perf_counter()
+    begin, cpu = perf_counter(), _cpu()
     outcomes, waited = run(task, task.cases)
     wall = perf_counter() - begin - waited
-    failed = [one for one, _ in outcomes]
-    print(json.dumps({"failed": failed, "vehicle_steps": sum(steps for _, steps in outcomes), "wall_s": wall}))
+    failed, steps = [one for one, _ in outcomes], sum(steps for _, steps in outcomes)
+    print(json.dumps({"failed": failed, "vehicle_steps": steps, "wall_s": wall, "cpu_s": _cpu() - cpu}))
+
+
+def _cpu() -> float:
+    """Processor time [s] of this process and of those that it has waited for, such as a sumo of its own."""
+    return sum(os.times()[:4])
