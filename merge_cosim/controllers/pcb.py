@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -70,53 +70,28 @@ class Pcb(IntendedAcceleration, Acc):
         super().start(count, setting)
         last = self.max_acceleration + TOLERANCE
         self.candidates = np.arange(self.min_acceleration, last, self.candidate_step)
-        self._counted = np.arange(1, self.steps + 1.0)[:, None, None]
-        self._speed_change = self._counted * (self.step * self.candidates[:, None])
+        self._changes = self.step * self.candidates
         self._comfort = (self.comfort * (self.candidates / self.comfort_scale) ** 2)[:, None]
 
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """The cheapest candidate; acc's law once the merging car is in the lane."""
-        cost = self.costs(seen)
-        not_yield = 0.5 + 0.5 * np.tanh(0.5 * log_odds)
-        expected = (1.0 - not_yield) * cost[Intention.YIELD] + not_yield * cost[Intention.NOT_YIELD]
-        planned = self.candidates[expected.argmin(axis=0)]
+        planned = np.zeros_like(log_odds)
+        planning = np.flatnonzero(~seen.merging_in_lane)
+        if len(planning):
+            cost = self.costs(Observation(*(getattr(seen, field.name)[planning] for field in fields(Observation))))
+            not_yield = 0.5 + 0.5 * np.tanh(0.5 * log_odds[planning])
+            expected = (1.0 - not_yield) * cost[Intention.YIELD] + not_yield * cost[Intention.NOT_YIELD]
+            planned[planning] = self.candidates[expected.argmin(axis=0)]
         return np.where(seen.merging_in_lane, super().command(seen, log_odds, target), planned)
 
     def costs(self, seen: Observation) -> FloatArray:
-        """Return C_I(a), shape (2, candidates, n), the first axis indexed by `Intention`.
+        """Return C_I(a), shape (2, candidates, n), the first axis indexed by `Intention`."""
+        from merge_cosim.controllers.compiled.predictions import predict
 
-        The batch is the last axis everywhere, so each operation runs over it in long rows, and `max_t exp(-gap)` is
-        taken as `exp(-min_t gap)`.
-        """
-        limit = self.setting.speed_limit
-        host = np.add(self._speed_change, seen.host_speed)
-        np.clip(host, 0.0, limit, out=host)
-        np.cumsum(host, axis=0, out=host)
-        slow = 1.0 - host[-1] * (1.0 / (self.steps * limit))
-        host *= self.step
-        host += seen.host_station
-        merging = self._merging_stations(seen)
-        # upstream of the merging point no car can be close: such steps are put out of each other's reach
-        host[host < -TOLERANCE] = -np.inf
-        merging[merging < -TOLERANCE] = np.inf
-        # gap = |middle of the one - middle of the other| - half of both lengths
-        merging += 0.5 * (seen.host_length - seen.merging_length)
-        apart = merging[:, :, None, :] - host[:, None, :, :]
-        np.abs(apart, out=apart)
-        gap: FloatArray = apart.min(axis=0) - 0.5 * (seen.host_length + seen.merging_length)
+        state = tuple(getattr(seen, field.name) for field in fields(Observation))
+        gains = self.step * self.intended(seen, self.setting.dt)
+        gap, slow = predict(state, gains, self._changes, self.steps, self.step, self.setting.speed_limit)
         close = np.exp(np.maximum(gap, 0.0) * (-1.0 / self.gap_scale))
         own = self.progress * slow + self._comfort
         cost: FloatArray = own + self.closeness * close + self.overlap * (gap < -TOLERANCE)
         return cost
-
-    def _merging_stations(self, seen: Observation) -> FloatArray:
-        """Predicted stations [m], shape (steps, 2, n)."""
-        gain = self.step * self.intended(seen, self.setting.dt)
-        limit = self.setting.speed_limit
-        unhindered = np.clip(seen.merging_speed + self._counted * gain, 0.0, limit)
-        station = seen.merging_station + self.step * np.cumsum(unhindered, axis=0)
-        # a_I is driven in the steps that begin before the merging point, and these come first
-        before = (seen.merging_station < -TOLERANCE) * (1 + np.count_nonzero(station[:-1] < -TOLERANCE, axis=0))
-        speed = np.clip(seen.merging_speed + np.minimum(self._counted, before) * gain, 0.0, limit)
-        stations: FloatArray = seen.merging_station + self.step * np.cumsum(speed, axis=0)
-        return stations
