@@ -138,20 +138,20 @@ def _tasks(
         own = Method.of(method, manifest["parameters"][f"{method} {variation}".strip()])
         models = sorted(set(group["model"]) - {""})
         one_model = replace(request, model=request.model or (models[0] if len(models) == 1 else None))
-        missing = set(group["source"])
+        wanted = set(zip(group["source"], group["model"], strict=True))
         for task in tasks_of(scenario, variation, [own], one_model, loaded):
-            if task.model and digest(task.model.to_json().encode()) != manifest["models"].get(task.model.name):
-                raise UserError(
-                    f"model {task.model.name}: {folder} was made with another one; give its file by --model"
-                )
-            pairs = task.cases.encounters
+            pairs, model = task.cases.encounters, task.names["model"]
             source = TRAFFIC if pairs is None else str(pairs.source[0])
-            if source in missing:
-                missing.discard(source)
-                yield task, group[group["source"] == source]
-        if missing:
+            if (source, model) not in wanted:
+                continue
+            if task.model and digest(task.model.to_json().encode()) != manifest["models"].get(model):
+                raise UserError(f"model {model}: {folder} was made with another one; give its file by --model")
+            wanted.remove((source, model))
+            yield task, group[(group["source"] == source) & (group["model"] == model)]
+        for source, model in sorted(wanted):
+            with_model = f" and of model {model}" if model else ""
             raise UserError(
-                f"scenario {name}: its rows are of {', '.join(sorted(missing))} pairs, which are not here; give --data"
+                f"scenario {name}: rows are of {source} pairs{with_model}, which are not here; give --data and --model"
             )
 
 
