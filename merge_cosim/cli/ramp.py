@@ -84,8 +84,8 @@ def edit(which: Which) -> None:
 
 @app.command("new")
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="The new ramp's name.")],
-    out: Annotated[Path, typer.Option("--out", help="Folder in which the ramp's folder is made.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The new ramp's name: letters, digits, '-' and '_'.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder in which the ramp's folder is made.")] = Path("ramps"),
     from_net: Annotated[Path | None, typer.Option(help="A SUMO net with an on-ramp (.net.xml, .net.xml.gz).")] = None,
     from_osm: Annotated[
         Path | None, typer.Option(help="An extract of OpenStreetMap with an on-ramp (.osm, .osm.gz).")
@@ -106,9 +106,14 @@ def new(
         float | None, typer.Option(min=1.0, max=100.0, help="Speed limit [m/s] (29, or the file's).")
     ] = None,
     lane_width: Annotated[float | None, typer.Option(min=2.0, max=10.0, help="Width of every lane [m] (3.6).")] = None,
+    left_hand: Annotated[
+        bool, typer.Option("--left-hand", help="Traffic keeps left, which an extract of OpenStreetMap does not say.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Start a ramp of your own: from a few numbers, a SUMO net, or an extract of OpenStreetMap."""
+    from merge_cosim.core.errors import UserError
+    from merge_cosim.ramps.create.folder import NAME
     from merge_cosim.ramps.create.start import start_ramp
 
     numbers = {
@@ -119,8 +124,11 @@ def new(
         "downstream": downstream,
         "speed_limit": speed_limit,
         "lane_width": lane_width,
+        "left_hand": left_hand or None,
     }
     given = {key: value for key, value in numbers.items() if value is not None}
+    if not NAME.fullmatch(name):
+        raise UserError(f"ramp new: '{name}' is no name for a ramp; use letters, digits, '-' and '_'")
     folder, found = start_ramp(out / name, given, from_net, from_osm, link)
     edit_it = f"Change it with: merge-cosim ramp edit {folder}"
     _print_found(folder, f"wrote {folder}", found, as_json, edit_it)
@@ -140,9 +148,10 @@ def describe(
     """Write a ramp.toml beside a net of your own, so that its configurations run; the net is left as it is."""
     from merge_cosim.ramps.create.describe import describe_ramp
     from merge_cosim.ramps.create.start import found
+    from merge_cosim.ramps.picture import PICTURE
 
     folder = describe_ramp(net, link, speed_limit)
-    _print_found(folder, f"wrote {folder / 'ramp.toml'}", found(folder), as_json)
+    _print_found(folder, f"wrote {folder / 'ramp.toml'} and {folder / PICTURE}", found(folder), as_json)
 
 
 def _print_found(folder: Path, wrote: str, found: list[str], as_json: bool, *more: str) -> None:

@@ -27,14 +27,15 @@ LENGTH_TOLERANCE = 0.01
 """How far a built length may be off the intended one [m]; netconvert writes centimetres."""
 DRAWN_TOLERANCE = 3.0
 """How far a drawn edge may be off its length [m]; a junction of 2 m at either end takes 1 m each."""
+SPEED_TOLERANCE = 0.005
+"""netconvert writes speeds to the centimetre per second [m/s]."""
 LANE_WIDTHS = (2.5, 6.0)
 """Lanes of freeways and on-ramps are of these widths [m]."""
 STAND_INS = {
-    13.89: "netconvert's default",
     39.44: "SUMO's default for motorways of OpenStreetMap",
     44.44: "the default of older versions of SUMO for motorways of OpenStreetMap",
 }
-"""Speeds [m/s] that netconvert sets where no speed is given."""
+"""Speeds [m/s] that netconvert sets for motorways where no speed is given, and that no road sign shows."""
 
 
 def check(folder: Path) -> list[str]:
@@ -136,7 +137,7 @@ def _speeds(net: sumolib.net.Net, file: RampFile) -> list[str]:
     """Lanes of the main road that are slower than the speed limit, and speeds that were not given."""
     problems = []
     for lane in (net.getEdge(edge).getLane(index) for edge, index in zip(file.main, file.host_lane, strict=True)):
-        if lane.getSpeed() < file.speed_limit:
+        if lane.getSpeed() < file.speed_limit - SPEED_TOLERANCE:
             problems.append(
                 f"speed_limit: lane {lane.getID()} allows {lane.getSpeed():g} m/s, less than {file.speed_limit:g} m/s; "
                 "lower speed_limit, or raise the edge's speed in the .edg.xml"

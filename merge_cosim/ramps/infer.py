@@ -18,6 +18,7 @@ from merge_cosim.ramps.paths import (
     follow,
     has_cars,
     is_link,
+    keeps_left,
     lanes_into,
     rank,
     targets,
@@ -96,11 +97,16 @@ def joints(net: sumolib.net.Net) -> list[Joint]:
 def joint_of(net: sumolib.net.Net, link: str) -> Joint:
     """Where the traffic of an edge joins the main road; the edge may be any of the on-ramp.
 
+    A way of OpenStreetMap that netconvert has split is meant by its number, too.
+
     Raises:
         UserError: The net has no such edge, or following it leads to no joint.
     """
     if not net.hasEdge(link):
-        raise UserError(f"the net has no edge '{link}'")
+        parts = [edge.getID() for edge in net.getEdges() if edge.getID().startswith(f"{link}#")]
+        if not parts:
+            raise UserError(f"the net has no edge '{link}'")
+        link = parts[0]
     known = {joint.link.getID(): joint for joint in joints(net)}
     ahead, seen, last = [net.getEdge(link)], {link}, net.getEdge(link)
     while ahead:
@@ -147,7 +153,7 @@ def _why_main(joint: Joint, joining: tuple[Edge, ...], leaving: tuple[Edge, ...]
         names = dict.fromkeys(f"'{edge.getID()}'" for edge in edges if edge is not joint.link)
         return ", ".join(names)
 
-    parts = ["the same road by class, name, lanes and direction, open to cars"]
+    parts = ["main: the same road by class, name, lanes and direction, open to cars"]
     parts += [f"it leaves aside {named(leaving)}"] if named(leaving) else []
     parts += [f"{named(joining)} come in before the gore"] if named(joining) else []
     parts += [f"upstream {begin}"] if begin else []
@@ -227,7 +233,7 @@ def _lanes_at_gore(joint: Joint) -> tuple[Lane, Lane, Lane, str]:
     if shared:
         # Of several shared lanes the one furthest into the road; of two on-ramp lanes the one that merges.
         lane = shared[-1] if min(own) <= min(through) else shared[0]
-        why = f"lane {lane} of '{gore.getID()}' is the one that the on-ramp's lane {own[lane].getID()} joins"
+        why = f"host_lane: lane {lane} of '{gore.getID()}' is the one that the on-ramp's lane {own[lane].getID()} joins"
         return own[lane], gore.getLane(lane), gore.getLane(lane), why
     if not max(own) < min(through) and min(own) < max(through):
         raise UserError(f"{where} comes in between the lanes of {main}, neither right nor left of them")
@@ -236,7 +242,8 @@ def _lanes_at_gore(joint: Joint) -> tuple[Lane, Lane, Lane, str]:
     host = lane + 1 if right else lane - 1
     if host not in through:
         raise UserError(f"{where}: no lane of {main} leads to the lane beside it, {gore.getID()}_{host}")
-    why = f"lane {host} of '{gore.getID()}' is the main road's lane beside the acceleration lane {gore.getID()}_{lane}"
+    beside = f"{gore.getID()}_{lane}"
+    why = f"host_lane: lane {host} of '{gore.getID()}' is the main road's lane beside the acceleration lane {beside}"
     return own[lane], gore.getLane(lane), gore.getLane(host), why
 
 
@@ -258,16 +265,6 @@ def _from_outside(joint: Joint) -> bool:
     (x, y), (end_x, end_y) = ends[1][-2:]
     side = (end_x - x) * (far[1] - end_y) - (end_y - y) * (far[0] - end_x)
     return bool((side > 0.0) == keeps_left(joint.gore))
-
-
-def keeps_left(edge: Edge) -> bool:
-    """Whether traffic keeps left: lane 0 lies left of the others, or, on one lane, is not known."""
-    lanes = edge.getLanes()
-    if len(lanes) < 2:
-        return False
-    (x, y), (next_x, next_y) = lanes[0].getShape()[:2]
-    other = lanes[-1].getShape()[0]
-    return bool((next_x - x) * (other[1] - y) - (next_y - y) * (other[0] - x) < 0.0)
 
 
 def _beside(lane: Lane, main: list[Lane]) -> tuple[list[Lane], Lane | None, str]:

@@ -65,6 +65,16 @@ def road_class(edge: Edge) -> int:
     return CLASSES.index(name) + 1 if name in CLASSES else 0
 
 
+def keeps_left(edge: Edge) -> bool:
+    """Whether traffic keeps left: an edge's lane 0 lies left of the others; of a single lane it is not known."""
+    lanes = edge.getLanes()
+    if len(lanes) < 2:
+        return False
+    (x, y), (next_x, next_y) = lanes[0].getShape()[:2]
+    other = lanes[-1].getShape()[0]
+    return bool((next_x - x) * (other[1] - y) - (next_y - y) * (other[0] - x) < 0.0)
+
+
 def turn(edge: Edge, onward: Edge) -> float:
     """Change of direction from one edge's end to another's start [degrees], left positive."""
     difference = _heading(onward.getShape()[:2]) - _heading(edge.getShape()[-2:])
@@ -133,9 +143,7 @@ def follow(
             ((edge, costs) for edge in fit if (costs := _step(steps[-1], edge, back, avoid))), (None, {})
         )
         if best is None:
-            names = ", ".join(f"'{edge.getID()}'" for edge in around) or "no other edge"
-            ends = "comes only from" if back else "leads only to"
-            stop = f"'{edges[-1].getID()}' is the last: its lane {ends} {names}"
+            stop = _why_last(edges[-1], list(steps[-1]), bool(around), back)
             break
         steps.append(costs)
         passed.append([edge for edge in around if edge is not best])
@@ -146,6 +154,16 @@ def follow(
     whole = sum(edge.getLength() for edge in edges[:kept]) >= reach
     beside = tuple(edge for found in passed[: kept - 1] for edge in found)
     return Trace(tuple(_traced(steps)[:kept]), beside, "" if whole else stop)
+
+
+def _why_last(edge: Edge, lanes: list[Lane], goes_on: bool, back: bool) -> str:
+    """Why an edge is the last of a path, in words."""
+    if not goes_on:
+        return f"the road {'begins' if back else 'ends'} with '{edge.getID()}'"
+    reached = {each.getEdge().getID() for lane in lanes for each in (lanes_into(lane) if back else targets(lane))}
+    if not reached:
+        return f"the lane {'begins' if back else 'ends'} with '{edge.getID()}'"
+    return f"the lane {'comes' if back else 'leads'} only {'from' if back else 'to'} {', '.join(sorted(reached))}"
 
 
 def _around(edge: Edge, back: bool, allowed: Callable[[Edge, Edge], bool]) -> list[Edge]:

@@ -71,12 +71,6 @@ def change(file: Path, old: str, new: str) -> None:
         ),
         ("con", ON, "", "host_lane: no connection in the net from merge_1 to main_out_0 (it leads to nothing)"),
         ("con", ON, UP, "host_lane: no connection in the net from merge_1 to main_out_0 (it leads to main_out_1)"),
-        (
-            "edg",
-            'id="ramp" from="ramp_start" to="gore" numLanes="1" speed="29.00"',
-            'id="ramp" from="ramp_start" to="gore" numLanes="1"',
-            "speed_limit: no speed limit for ramp_0: 13.89 m/s is netconvert's default",
-        ),
         ("edg", 'id="merge"', 'disallow="passenger" id="merge"', "merge_0 is closed to passenger cars; mend 'allow'"),
         ("edg", 'width="3.60"', 'width="7.20"', "lane main_in_0 is 7.20 m wide, not 2.5 to 6 m"),
         (

@@ -37,6 +37,17 @@ def test_new_ramp_can_be_used_at_once(tmp_path: Path) -> None:
     assert isinstance(RUN.invoke(app, words).exception, UserError), "an existing folder is never written over"
 
 
+def test_a_name_is_no_path_and_out_has_a_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("../evil", "..", str(tmp_path / "evil"), "a/b"):
+        result = RUN.invoke(app, ["new", name])
+        assert isinstance(result.exception, UserError)
+        assert "is no name for a ramp" in str(result.exception)
+    assert list(tmp_path.iterdir()) == []
+    assert RUN.invoke(app, ["new", "mine"]).exit_code == 0
+    assert (tmp_path / "ramps" / "mine" / "ramp.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_edit_says_that_there_is_no_display(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.ramps.create.folder import definition_text
+from merge_cosim.ramps.create.folder import definition_text, require_checked
 from merge_cosim.ramps.create.new import RampNumbers, default_merging_point
 from merge_cosim.ramps.create.onramp import Origin, choose, read_source, sources_of, title_of
 from merge_cosim.ramps.definition import FILE_NAME, RampFile
+from merge_cosim.ramps.picture import draw
 
 
 def describe_ramp(net_file: Path, link: str | None = None, speed_limit: float | None = None) -> Path:
-    """Write a `ramp.toml` beside a net, which names the net's own edges; returns the folder.
+    """Write a `ramp.toml` and a picture beside a net, which name the net's own edges; returns the folder.
 
     Args:
         net_file: The SUMO net (`.net.xml` or `.net.xml.gz`).
@@ -21,7 +22,7 @@ def describe_ramp(net_file: Path, link: str | None = None, speed_limit: float | 
 
     Raises:
         UserError: A `ramp.toml` is there already; the file is no net, or has no on-ramp, or several and `link` is not
-            given.
+            given; or the ramp would not pass `ramp check`.
     """
     folder, origin = net_file.parent, Origin(net_file)
     target = folder / FILE_NAME
@@ -34,6 +35,7 @@ def describe_ramp(net_file: Path, link: str | None = None, speed_limit: float | 
         raise UserError(f"{net_file}: {error}") from None
     length = sum(float(lane.getLength()) for lane in path.beside)
     given = None if speed_limit is None else "merge-cosim ramp describe"
+    limit = speed_limit or float(path.main[path.before].getSpeed())
     merging = (*path.ramp, *path.beside)
     definition = RampFile(
         title=title_of(joint, folder.resolve().name),
@@ -44,12 +46,18 @@ def describe_ramp(net_file: Path, link: str | None = None, speed_limit: float | 
         ramp=[lane.getEdge().getID() for lane in merging],
         merging_lane=[lane.getIndex() for lane in merging],
         gore=joint.gore.getID(),
-        merging_point=default_merging_point(length),
-        speed_limit=round(speed_limit or float(path.main[path.before].getSpeed()), 2),
-        sources=sources_of(joint, path, length, origin, given),
+        merging_point=default_merging_point(length, limit),
+        speed_limit=round(limit, 2),
+        sources=sources_of(joint, path, length, limit, origin, given),
     )
     try:
-        target.write_text(definition_text(definition), encoding="utf-8")
+        target.write_text(definition_text(definition, path.reasons), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{target}: cannot be written ({error.strerror})") from None
+    try:
+        require_checked(folder, folder)
+    except UserError:
+        target.unlink()
+        raise
+    draw(folder)
     return folder

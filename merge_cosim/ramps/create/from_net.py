@@ -12,6 +12,7 @@ from merge_cosim.ramps.create.onramp import Origin, choose, read_source, sources
 from merge_cosim.ramps.create.plain import PlainXml
 from merge_cosim.ramps.definition import Extensions, RampFile
 from merge_cosim.ramps.infer import Course, Joint
+from merge_cosim.ramps.paths import keeps_left
 
 MIN_AFTER = 100.0
 """Road kept beyond the acceleration lane's end, at least [m]."""
@@ -52,9 +53,10 @@ def ramp_from_net(
         raise UserError(f"{origin.file}: the acceleration lane is too long for the road; give --downstream {after:.0f}")
     layout = lay_out(path, upstream, downstream)
     limit = speed_limit or float(layout.main[layout.gore].lane.getSpeed())
-    plain = PlainXml(net, path, layout, speed_limit)
+    left = any(keeps_left(road.edge) for road in layout.roads)
+    plain = PlainXml(net, path, layout, limit, raised=speed_limit is None)
     definition = _definition(folder.name, joint, path, layout, limit, origin, given=speed_limit is not None)
-    return write_ramp(folder, plain.nodes(), plain.edges(), plain.connections(), definition)
+    return write_ramp(folder, plain.nodes(), plain.edges(), plain.connections(), definition, path.reasons, left)
 
 
 def _definition(
@@ -67,8 +69,12 @@ def _definition(
     file = origin.file.name
     sources = {
         "geometry": f"{file}: its lanes, from node to node; the host's lane is kept, the others lie beside it.",
-        **sources_of(joint, path, length, origin, "merge-cosim ramp new" if given else None),
+        **sources_of(joint, path, length, limit, origin, "merge-cosim ramp new" if given else None),
     }
+    slower = [road for road in layout.main if road.lane.getSpeed() < limit - 0.005] if not given else []
+    if slower:
+        named = ", ".join(f"{road.edge.getID()} ({road.lane.getSpeed():g} m/s)" for road in slower)
+        sources["speed_limit"] += f" Slower stretches of the road have it, too: {named}."
     if layout.surveyed:
         sources["extensions"] = f"{file} ends there; straight road was added."
     return RampFile(
@@ -79,7 +85,7 @@ def _definition(
         ramp=[road.edge.getID() for road in layout.ramp] + beside,
         merging_lane=[road.lane.getIndex() for road in layout.ramp] + [lane.getIndex() for lane in path.beside],
         gore=gore.edge.getID(),
-        merging_point=default_merging_point(length),
+        merging_point=default_merging_point(length, limit),
         speed_limit=round(limit, 2),
         lengths={road.edge.getID(): road.length for road in layout.roads},
         extensions=Extensions(**layout.surveyed),

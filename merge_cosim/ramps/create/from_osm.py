@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+import gzip
+import math
+import re
 import tempfile
 from pathlib import Path
 
 import sumo
 import sumolib
+from lxml import etree
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.build import netconvert
+from merge_cosim.ramps.check import COMFORTABLE_BRAKING
 from merge_cosim.ramps.create.folder import require_new
 from merge_cosim.ramps.create.from_net import ramp_from_net
 from merge_cosim.ramps.create.new import RampNumbers
-from merge_cosim.ramps.create.onramp import Origin, root_element
+from merge_cosim.ramps.create.onramp import Origin, choose, read_source, root_element
 
 KEPT = ("highway.motorway", "highway.motorway_link", "highway.trunk", "highway.trunk_link")
 """Kinds of roads that are read from the extract."""
 GUESSED = "AddedOnRampEdge"
 """End of the ids of edges on which netconvert has guessed an acceleration lane."""
+NONE = re.compile(rb"""v=["']none["']""")
+"""A value of a tag that may say that there is no speed limit."""
+ADVISORY = "130"
+"""Germany's advisory speed on motorways without a limit [km/h]."""
+WAY = re.compile(r"^-|[#-].*$")
+"""What netconvert adds to a way's number in an edge's id."""
 OPTIONS = (
     *("--keep-edges.by-type", ",".join(KEPT)),
     "--proj.utm",
@@ -40,6 +51,7 @@ def ramp_from_osm(
     speed_limit: float | None = None,
     upstream: float = RampNumbers.upstream,
     downstream: float = RampNumbers.downstream,
+    left_hand: bool = False,
 ) -> Path:
     """Write the stretch around one on-ramp of an extract into a new folder, and build it.
 
@@ -50,6 +62,7 @@ def ramp_from_osm(
         speed_limit: Speed limit of the main road [m/s]; the extract's `maxspeed` if not given.
         upstream: Main road and on-ramp before the gore [m]; what the extract lacks is added straight on.
         downstream: Road after the gore [m]; likewise.
+        left_hand: Traffic keeps left, which the extract does not say.
 
     Raises:
         UserError: The file is no OSM XML, or `ramp_from_net` finds no ramp in it.
@@ -59,16 +72,66 @@ def ramp_from_osm(
     if root.tag != "osm":
         raise UserError(f"{extract}: its root is <{root.tag}>, not <osm>; a SUMO net goes with --from-net")
     with tempfile.TemporaryDirectory() as scratch:
-        net_file = Path(scratch) / "extract.net.xml"
-        types = Path(sumo.SUMO_HOME) / "data" / "typemap" / "osmNetconvert.typ.xml"
-        files = ("--osm-files", str(extract), "--type-files", str(types), "--output-file", str(net_file))
-        try:
-            netconvert(extract, *files, *OPTIONS)
-        except UserError as error:
-            if str(error).endswith(("No nodes loaded.", "No edges loaded.")):
-                raise UserError(f"{extract}: no motorway, no trunk road and no link to either in it") from None
-            raise
-        net = sumolib.net.readNet(str(net_file))
-        unlimited = [edge.getID() for edge in net.getEdges() if "speed" in edge.getParam("osmDefaults", "").split()]
-        origin = Origin(extract, GUESSED, unlimited)
+        net_file, origin = read_extract(extract, Path(scratch), link, speed_limit, left_hand)
         return ramp_from_net(folder, net_file, link, speed_limit, upstream, downstream, origin)
+
+
+def read_extract(
+    extract: Path, scratch: Path, link: str | None, speed_limit: float | None, left_hand: bool
+) -> tuple[Path, Origin]:
+    """Make a net of an extract in a scratch folder; an acceleration lane that is guessed suits the speed limit."""
+    readable, advised = _with_advisory_speed(extract, scratch)
+    net_file = scratch / "extract.net.xml"
+    _convert(extract, readable, net_file, left_hand)
+    net = read_source(net_file, extract)
+    if length := _guessed_too_short(net, link, speed_limit):
+        _convert(extract, readable, net_file, left_hand, "--ramps.ramp-length", str(length))
+        net = read_source(net_file, extract)
+    edges = net.getEdges()
+    unlimited = [edge.getID() for edge in edges if "speed" in edge.getParam("osmDefaults", "").split()]
+    at_advisory_speed = [edge.getID() for edge in edges if WAY.sub("", edge.getID()) in advised]
+    return net_file, Origin(extract, GUESSED, unlimited, at_advisory_speed)
+
+
+def _convert(extract: Path, readable: Path, net_file: Path, left_hand: bool, *more: str) -> None:
+    """Make a net of an extract; error lines speak of `extract`, netconvert reads `readable`."""
+    types = Path(sumo.SUMO_HOME) / "data" / "typemap" / "osmNetconvert.typ.xml"
+    files = ("--osm-files", str(readable), "--type-files", str(types), "--output-file", str(net_file))
+    try:
+        netconvert(extract, *files, *OPTIONS, *(["--lefthand"] if left_hand else []), *more)
+    except UserError as error:
+        if str(error).endswith(("No nodes loaded.", "No edges loaded.")):
+            raise UserError(f"{extract}: no motorway, no trunk road and no link to either in it") from None
+        raise
+
+
+def _with_advisory_speed(extract: Path, scratch: Path) -> tuple[Path, set[str]]:
+    """An extract in which `maxspeed=none`, which netconvert does not know, is the advisory speed; also its ways."""
+    content = gzip.decompress(extract.read_bytes()) if extract.suffix == ".gz" else extract.read_bytes()
+    if b"maxspeed" not in content or not NONE.search(content):
+        return extract, set()
+    try:
+        root = etree.fromstring(content, etree.XMLParser(huge_tree=True, resolve_entities=False))
+    except etree.XMLSyntaxError as error:
+        raise UserError(f"{extract}: not XML: {error}") from None
+    ways = set[str]()
+    for tag in root.iterfind("way/tag[@v='none']"):
+        if tag.get("k", "").startswith("maxspeed") and (way := tag.getparent()) is not None:
+            tag.set("v", ADVISORY)
+            ways.add(way.get("id", ""))
+    readable = scratch / "advised.osm"
+    readable.write_bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8"))
+    return readable, ways
+
+
+def _guessed_too_short(net: sumolib.net.Net, link: str | None, speed_limit: float | None) -> int:
+    """How long a guessed acceleration lane must be [m] for comfortable braking after the merging point; 0: it is."""
+    try:
+        _, path = choose(net, link, RampNumbers.upstream, RampNumbers.downstream)
+    except UserError:
+        return 0  # ramp_from_net tells
+    if not path.beside or GUESSED not in path.beside[0].getEdge().getID():
+        return 0
+    limit = speed_limit or float(path.main[path.before].getSpeed())
+    needed = limit**2 / (2.0 * COMFORTABLE_BRAKING) / 0.8  # the merging point is a fifth behind the gore
+    return math.ceil(needed / 10.0) * 10 if needed > sum(lane.getLength() for lane in path.beside) else 0

@@ -11,7 +11,7 @@ import numpy as np
 from merge_cosim.core.units import FloatArray
 from merge_cosim.ramps import polyline
 from merge_cosim.ramps.infer import Course
-from merge_cosim.ramps.paths import Edge, Lane
+from merge_cosim.ramps.paths import Edge, Lane, keeps_left
 
 EXIT_LENGTH = 300.0
 """As much of an off-ramp is kept [m]."""
@@ -197,16 +197,21 @@ def _ending_at(line: FloatArray, target: FloatArray, along: FloatArray) -> Float
 
 def _aside(line: FloatArray, lane: Lane, other: Lane) -> FloatArray:
     """Axis of another lane of the same edge, from a lane's."""
-    return polyline.beside(line, _from_right(other) - _from_right(lane))
+    return polyline.beside(line, _side(lane) * (_from_outside(other) - _from_outside(lane)))
 
 
 def _centre(line: FloatArray, lane: Lane) -> FloatArray:
     """Middle of an edge, from a lane's axis."""
     width = sum(each.getWidth() for each in lane.getEdge().getLanes())
-    return polyline.beside(line, width / 2 - _from_right(lane))
+    return polyline.beside(line, _side(lane) * (width / 2 - _from_outside(lane)))
 
 
-def _from_right(lane: Lane) -> float:
-    """Distance from its edge's right border to a lane's axis [m]."""
-    further_right = lane.getEdge().getLanes()[: lane.getIndex()]
-    return float(sum(each.getWidth() for each in further_right) + lane.getWidth() / 2)
+def _side(lane: Lane) -> int:
+    """1 where lanes are counted from the right, -1 where traffic keeps left and they are counted from there."""
+    return -1 if keeps_left(lane.getEdge()) else 1
+
+
+def _from_outside(lane: Lane) -> float:
+    """Distance from its edge's outer border, that of lane 0, to a lane's axis [m]."""
+    further_out = lane.getEdge().getLanes()[: lane.getIndex()]
+    return float(sum(each.getWidth() for each in further_out) + lane.getWidth() / 2)

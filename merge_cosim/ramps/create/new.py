@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.ramps.check import HARD_BRAKING
 from merge_cosim.ramps.create.folder import document, require_new, write_ramp
 from merge_cosim.ramps.definition import RampFile
 from merge_cosim.ramps.view import ROLES
@@ -41,12 +42,22 @@ class RampNumbers:
     @property
     def merging_point(self) -> float:
         """Default merging point [m past the gore]."""
-        return default_merging_point(self.acceleration_lane)
+        return default_merging_point(self.acceleration_lane, self.speed_limit)
 
 
-def default_merging_point(acceleration_lane: float) -> float:
-    """A fifth of the acceleration lane [m past the gore], about as on US-101."""
-    return float(round(acceleration_lane / 5))
+def default_merging_point(acceleration_lane: float, speed_limit: float) -> float:
+    """A fifth of the acceleration lane [m past the gore], about as on US-101; nearer where it takes more to brake."""
+    latest = math.floor(acceleration_lane - speed_limit**2 / (2.0 * HARD_BRAKING))
+    return float(max(min(round(acceleration_lane / 5), latest), 0))
+
+
+def merging_point_source(acceleration_lane: float, speed_limit: float) -> str:
+    """Where the default merging point comes from, in words."""
+    if not acceleration_lane:
+        return "The gore."
+    if default_merging_point(acceleration_lane, speed_limit) == round(acceleration_lane / 5):
+        return "Default: a fifth of the acceleration lane."
+    return f"Default: as much of the acceleration lane is left as braking at {HARD_BRAKING:g} m/s^2 takes."
 
 
 def new_ramp(folder: Path, numbers: RampNumbers) -> Path:
@@ -162,6 +173,6 @@ def _definition(name: str, n: RampNumbers) -> RampFile:
         lengths=lengths | dict.fromkeys(beside, n.acceleration_lane),
         sources={
             "geometry": "Designed: straight roads made by merge-cosim ramp new.",
-            "merging_point": "Default: a fifth of the acceleration lane." if beside else "The gore.",
+            "merging_point": merging_point_source(n.acceleration_lane, n.speed_limit),
         },
     )

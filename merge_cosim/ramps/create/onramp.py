@@ -13,6 +13,7 @@ import sumolib
 from lxml import etree
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.ramps.create.new import merging_point_source
 from merge_cosim.ramps.infer import Course, Joint, course, joint_of, joints
 
 
@@ -24,11 +25,13 @@ class Origin:
         file: The user's file.
         guessed: Parts of edge ids that netconvert gives where it guesses an acceleration lane.
         unlimited: Edges without a speed limit in the file, whose lanes have a stand-in's.
+        advised: Edges that the file says to have no speed limit, whose lanes have the advisory speed.
     """
 
     file: Path
     guessed: str | None = None
     unlimited: Collection[str] = ()
+    advised: Collection[str] = ()
 
 
 def root_element(file: Path) -> etree._Element:
@@ -53,8 +56,6 @@ def read_source(path: Path, named: Path) -> sumolib.net.Net:
     if root.tag != "net":
         more = "an extract of OpenStreetMap goes with --from-osm" if root.tag == "osm" else "give a .net.xml"
         raise UserError(f"{named}: its root is <{root.tag}>, not <net>; {more}")
-    if root.get("lefthand", "false").lower() in ("true", "1", "yes"):
-        raise UserError(f"{named}: a net with left-hand traffic; only right-hand traffic can be read")
     try:
         net = sumolib.net.readNet(str(path))
     except Exception as error:  # sumolib passes on whatever its parser meets
@@ -105,13 +106,16 @@ def _listed(net: sumolib.net.Net, upstream: float, downstream: float) -> str:
     return f"{many} with --link: {', '.join(shown)}"
 
 
-def sources_of(joint: Joint, path: Course, length: float, origin: Origin, given: str | None) -> dict[str, str]:
+def sources_of(
+    joint: Joint, path: Course, length: float, limit: float, origin: Origin, given: str | None
+) -> dict[str, str]:
     """Where each fact of a ramp but its geometry comes from, in words.
 
     Args:
         joint: Where the on-ramp comes in.
         path: The two paths.
         length: Length of the acceleration lane [m].
+        limit: Speed limit [m/s].
         origin: What the net was made from.
         given: The command to which the user has given the speed limit; None if it is the net's.
     """
@@ -119,7 +123,7 @@ def sources_of(joint: Joint, path: Course, length: float, origin: Origin, given:
     kind = link.getType() or "no type"
     sources = {
         "ramp": f"{file}: edge {link.getID()} ({kind}) joins {joint.through.getID()} at the gore.",
-        "merging_point": "Default: a fifth of the acceleration lane." if path.beside else "The gore.",
+        "merging_point": merging_point_source(length, limit),
         "speed_limit": f"{file}: lane {gore.getID()}.",
     }
     if path.beside:
@@ -130,6 +134,8 @@ def sources_of(joint: Joint, path: Course, length: float, origin: Origin, given:
         sources["speed_limit"] = f"Given to {given}."
     elif gore.getEdge().getID() in origin.unlimited:
         sources["speed_limit"] = f"SUMO's default for this kind of road: {file} has no maxspeed here."
+    elif gore.getEdge().getID() in origin.advised:
+        sources["speed_limit"] = f"{file}: maxspeed=none; Germany's advisory speed of 130 km/h stands for it."
     return sources
 
 

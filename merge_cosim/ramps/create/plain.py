@@ -25,10 +25,12 @@ class PlainXml:
         net: The net it comes from.
         path: The course that was drawn.
         layout: What is written.
-        speed_limit: Speed limit of the main road [m/s]; each lane's own if not given.
+        speed_limit: Speed limit of the main road [m/s].
+        raised: Only its slower lanes get it, instead of all.
     """
 
-    def __init__(self, net: sumolib.net.Net, path: Course, layout: Layout, speed_limit: float | None) -> None:
+    def __init__(self, net: sumolib.net.Net, path: Course, layout: Layout, speed_limit: float, raised: bool) -> None:
+        self._raised = raised
         self._net, self._layout, self._speed_limit = net, layout, speed_limit
         self._nodes = nodes(layout.roads)
         self._joins = not path.beside
@@ -109,7 +111,10 @@ class PlainXml:
         return [*rows, "</edge>"]
 
     def _speed(self, lane: Lane, main: bool) -> float:
-        return self._speed_limit if main and self._speed_limit else float(lane.getSpeed())
+        own = float(lane.getSpeed())
+        if not main:
+            return own
+        return max(own, self._speed_limit) if self._raised else self._speed_limit
 
     def _location(self) -> list[str]:
         """Where the ramp lies on the globe, if the net knows it."""

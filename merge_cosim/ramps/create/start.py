@@ -8,9 +8,9 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.create.from_net import ramp_from_net
 from merge_cosim.ramps.create.from_osm import ramp_from_osm
 from merge_cosim.ramps.create.new import RampNumbers, new_ramp
-from merge_cosim.ramps.definition import read_ramp_file
+from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
 
-FOR_FILES = ("upstream", "downstream", "speed_limit")
+FOR_FILES = ("upstream", "downstream", "speed_limit", "left_hand")
 """Numbers that may be given beside a file."""
 
 
@@ -34,8 +34,12 @@ def start_ramp(
     if net is None and extract is None:
         if link is not None:
             raise UserError("ramp new: --link names an edge of a file; give --from-net or --from-osm, too")
+        if "left_hand" in numbers:
+            raise UserError("ramp new: --left-hand is for --from-osm; mirror a straight ramp to see it from the left")
         return new_ramp(folder, RampNumbers(**numbers)), []
     for key in numbers:
+        if key == "left_hand" and net is not None:
+            raise UserError("ramp new: --left-hand is for --from-osm; a SUMO net says itself on which side it drives")
         if key not in FOR_FILES:
             raise UserError(f"ramp new: --{key.replace('_', '-')} comes from the file; leave it out")
     if net is not None:
@@ -48,8 +52,10 @@ def start_ramp(
 def found(folder: Path) -> list[str]:
     """What a ramp's `ramp.toml` names, and where it comes from, a line each."""
     file = read_ramp_file(folder)
+    text = (folder / FILE_NAME).read_text(encoding="utf-8")
     return [
         f"main road: {' '.join(file.main)}, host's lanes {' '.join(map(str, file.host_lane))}",
         f"on-ramp: {' '.join(file.ramp)}, merging lanes {' '.join(map(str, file.merging_lane))}",
-        *(f"{key}: {text}" for key, text in file.sources.items()),
+        *(line.removeprefix("# ") for line in text.splitlines() if line.startswith("# ")),
+        *(f"{key}: {source}" for key, source in file.sources.items()),
     ]

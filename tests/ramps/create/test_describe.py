@@ -30,7 +30,7 @@ def test_a_real_interchange_is_described_and_not_touched(tmp_path: Path) -> None
     net = copied(A10, tmp_path)
     assert describe_ramp(net, "24498409") == tmp_path
     assert net.read_bytes() == A10.read_bytes()
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["osm.net.xml", "ramp.toml"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["osm.net.xml", "ramp.png", "ramp.toml"]
     assert check(tmp_path) == []
     file, ramp = read_ramp_file(tmp_path), Ramp.load(tmp_path)
     assert file.described

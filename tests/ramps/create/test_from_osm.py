@@ -50,17 +50,18 @@ def test_an_acceleration_lane_that_is_guessed_is_told(tmp_path: Path) -> None:
     folder = ramp_from_osm(tmp_path / "mine", write(tmp_path, text))
     file = read_ramp_file(folder)
     assert file.title == "mine: on-ramp onto King's & Queen's"
-    assert file.sources["acceleration_lane"] == "Guessed by netconvert, 100 m: extract.osm has none."
-    assert Ramp.load(folder).auxiliary_end == pytest.approx(100.0, abs=1.0)
-    assert any("braking comfortably (3.4 m/s^2) from 33.33 m/s takes 163 m" in line for line in notes(folder))
+    assert file.sources["acceleration_lane"] == "Guessed by netconvert, 210 m: extract.osm has none."
+    # Long enough to brake comfortably from 120 km/h after the merging point, 33.33^2 / 2 / 3.4 = 163 m.
+    assert Ramp.load(folder).auxiliary_end == pytest.approx(210.0, abs=1.0)
+    assert (check(folder), notes(folder)) == ([], [])
 
 
 def test_a_missing_limit_is_a_problem_and_can_be_given(tmp_path: Path) -> None:
     bare = write(tmp_path, "\n".join(line for line in TEXT.splitlines() if "maxspeed" not in line))
-    folder = ramp_from_osm(tmp_path / "bare", bare)
-    assert "extract.osm has no maxspeed here" in read_ramp_file(folder).sources["speed_limit"]
-    (problem,) = check(folder)
-    assert "no speed limit for 1001_0, 1002_1, 1003_0, 1002_0: 39.44 m/s is SUMO's default" in problem
+    problem = "no speed limit for 1001_0, 1002_1, 1003_0, 1002_0: 39.44 m/s is SUMO's default"
+    with pytest.raises(UserError, match=f"bare: not written, since it would not pass ramp check: .*{problem}"):
+        ramp_from_osm(tmp_path / "bare", bare)
+    assert not (tmp_path / "bare").exists()
     assert check(ramp_from_osm(tmp_path / "given", bare, speed_limit=30.0)) == []
 
 

@@ -43,8 +43,12 @@ def test_what_comes_out_has_the_numbers(
 
 
 def test_an_acceleration_lane_too_short_to_brake_in_is_told(tmp_path: Path) -> None:
-    (problem,) = check(new_ramp(tmp_path / "mine", RampNumbers(acceleration_lane=50.0)))
-    assert "40 m of auxiliary lane after it, but 53 m to brake in" in problem
+    with pytest.raises(UserError, match="50 m of auxiliary lane after it, but 53 m to brake in"):
+        new_ramp(tmp_path / "mine", RampNumbers(acceleration_lane=50.0))
+    assert not (tmp_path / "mine").exists()
+    # Where a fifth would leave too little, the merging point is as far on as braking allows: 60 - 29^2 / 16 = 7.
+    folder = new_ramp(tmp_path / "mine", RampNumbers(acceleration_lane=60.0))
+    assert Ramp.load(folder).merging_point == 7.0
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def test_every_command_of_the_page(tmp_path: Path) -> None:
         for line in block.splitlines():
             printed.setdefault(line, []).append(run(line, tmp_path))
     (shown,) = re.findall(r"```text\n(.*?)```", TEXT, re.DOTALL)
-    (made,) = printed["merge-cosim ramp new rosenbach --out ramps --from-osm rosenbach.osm"]
+    (made,) = printed["merge-cosim ramp new rosenbach --from-osm rosenbach.osm"]
     assert shown in made
     assert "rosenbach.netccfg" in printed["merge-cosim ramp edit ramps/rosenbach"][0]
     (stale,) = printed["merge-cosim ramp check ramps/rosenbach    # status 1"]

@@ -33,7 +33,7 @@ def test_the_on_ramp_is_found_and_followed(net):
     assert {lane.getEdge().getID() for lane in path.beside}
     assert not is_link(path.beside[0].getEdge())
     assert title_of(joint, "mine").startswith("mine")
-    assert set(sources_of(joint, path, 100.0, Origin(GAME), None)) >= {"ramp", "speed_limit"}
+    assert set(sources_of(joint, path, 100.0, 30.0, Origin(GAME), None)) >= {"ramp", "speed_limit"}
 
 
 def test_the_layout_begins_at_the_gore_and_is_written_as_plain_xml(net):
@@ -42,7 +42,7 @@ def test_the_layout_begins_at_the_gore_and_is_written_as_plain_xml(net):
     placed = nodes(layout.roads)
     assert placed[layout.main[layout.gore].start].place[0] == pytest.approx(0.0, abs=1e-6)
     assert sum(road.length for road in layout.main[: layout.gore]) == pytest.approx(300.0)
-    plain = PlainXml(net, path, layout, 25.0)
+    plain = PlainXml(net, path, layout, 25.0, raised=False)
     written = [etree.fromstring(text.encode()) for text in (plain.nodes(), plain.edges(), plain.connections())]
     assert {one.get("id") for one in written[0].iter("node")} == set(placed)
     ends = {edge.get("id"): (edge.get("from"), edge.get("to")) for edge in written[1].iter("edge")}

@@ -1,0 +1,462 @@
+"""The corpus: for each ramp how it is made, and which path and host lane are right."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import corpus_sources as sources
+from corpus_sources import Point
+
+FAR, END = -900.0, 2600.0
+"""Where the main roads of the corpus begin and end [m past the gore]."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One ramp.
+
+    Attributes:
+        name: What it is.
+        make: Writes the file into a folder and returns it.
+        main: The right main road: way numbers or edge ids, each once.
+        ramp: The right on-ramp before the gore, likewise.
+        from_left: How many lanes lie left of the host's after the gore.
+        lane: Whether there is an acceleration lane.
+        numbers: More arguments for `ramp new`.
+    """
+
+    name: str
+    make: Callable[[Path], Path]
+    main: Sequence[str]
+    ramp: Sequence[str]
+    from_left: int
+    lane: bool = True
+    numbers: Mapping[str, object] | None = None
+
+
+def road(
+    *points: Point, lanes: int = 2, kind: str = "motorway", **tags: str
+) -> tuple[Sequence[Point], Mapping[str, str]]:
+    given = {"highway": kind, "lanes": str(lanes), "maxspeed": "120"} | {
+        k.replace("_", ":"): v for k, v in tags.items()
+    }
+    return points, given
+
+
+def link(*points: Point, lanes: int = 1, **tags: str) -> tuple[Sequence[Point], Mapping[str, str]]:
+    return road(*points, lanes=lanes, kind=tags.pop("kind", "motorway_link"), **{"maxspeed": "80"} | tags)
+
+
+IN, ON = (-600.0, -90.0), (-200.0, -20.0)
+GORE = (0.0, 0.0)
+
+
+def osm(
+    name: str,
+    ways: dict[int, tuple[Sequence[Point], Mapping[str, str]]],
+    main: str,
+    ramp: str,
+    from_left: int,
+    lane: bool = True,
+    signals: Sequence[Point] = (),
+    **numbers: object,
+) -> Case:
+    numbers.setdefault("link", ramp.split()[-1])
+    return Case(
+        name, lambda folder: sources.osm(folder, ways, signals), main.split(), ramp.split(), from_left, lane, numbers
+    )
+
+
+def exit_at(x: float, **tags: str) -> tuple[Sequence[Point], Mapping[str, str]]:
+    return link((x, 0.0), (x + 150.0, -15.0), (x + 500.0, -120.0), **tags)
+
+
+def main(
+    *stops: float, lanes: Sequence[int] = (), first: int = 1, **tags: str
+) -> dict[int, tuple[Sequence[Point], Mapping[str, str]]]:
+    """A straight main road in ways numbered from `first`, split at x [m]."""
+    ends = [FAR, *stops, END]
+    each = lanes or [2] * (len(ends) - 1)
+    return {
+        first + n: road((a, 0.0), (b, 0.0), lanes=count, **tags)
+        for n, (a, b, count) in enumerate(zip(ends[:-1], ends[1:], each, strict=True))
+    }
+
+
+RAMP = link(IN, ON, GORE)
+LOOP = [
+    (-60.0 - 60.0 * math.sin(a), -80.0 + 60.0 * math.cos(a)) for a in (math.radians(d) for d in range(270, -1, -30))
+]
+
+OSM = [
+    osm("acceleration lane mapped", {**main(0, 250, lanes=(2, 3, 2)), 9: RAMP}, "1 2 3", "9", 1),
+    osm("acceleration lane guessed", {**main(0), 9: RAMP}, "1 2", "9", 1),
+    osm("exit 700 m after", {**main(0, 700), 9: RAMP, 8: exit_at(700)}, "1 2 3", "9", 1),
+    osm("exit 1200 m after", {**main(0, 1200), 9: RAMP, 8: exit_at(1200)}, "1 2 3", "9", 1),
+    osm(
+        "exit lane mapped",
+        {**main(0, 250, 600, 800, lanes=(2, 3, 2, 3, 2)), 9: RAMP, 8: exit_at(800)},
+        "1 2 3 4 5",
+        "9",
+        1,
+    ),
+    osm(
+        "exit before",
+        {**main(-500, 0), 9: RAMP, 8: link((-500.0, 0.0), (-350.0, -40.0), (-250.0, -160.0))},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "exits before and after",
+        {**main(-500, 0, 900), 9: RAMP, 8: exit_at(900), 7: link((-500.0, 0.0), (-350.0, -40.0), (-250.0, -160.0))},
+        "1 2 3 4",
+        "9",
+        1,
+    ),
+    osm(
+        "next on-ramp after",
+        {**main(0, 900), 9: RAMP, 8: link((400.0, -90.0), (700.0, -20.0), (900.0, 0.0))},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "exit after, then on-ramp",
+        {**main(0, 700, 1300), 9: RAMP, 8: exit_at(700), 7: link((900.0, -90.0), (1100.0, -20.0), (1300.0, 0.0))},
+        "1 2 3 4",
+        "9",
+        1,
+    ),
+    osm(
+        "on-ramp before",
+        {**main(-600, 0), 9: RAMP, 8: link((-850.0, -90.0), (-750.0, -20.0), (-600.0, 0.0))},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm("weaving to an exit", {**main(0, 350, lanes=(2, 3, 2)), 9: RAMP, 8: exit_at(350)}, "1 2 3", "9", 1),
+    osm("lane drop after", {**main(0, 250, 700, lanes=(3, 4, 3, 2)), 9: RAMP}, "1 2 3", "9", 2),
+    osm("two-lane on-ramp", {**main(0, 400, lanes=(2, 4, 2)), 9: link(IN, ON, GORE, lanes=2)}, "1 2 3", "9", 1),
+    osm(
+        "loop ramp",
+        {**main(0, 250, lanes=(2, 3, 2)), 9: link(*LOOP, (-30.0, -6.0), GORE, maxspeed="40")},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "collector road",
+        {
+            **main(-800, 0, 250, lanes=(2, 2, 3, 2)),
+            8: link((-800.0, 0.0), (-700.0, -18.0), (-400.0, -18.0), lanes=1),
+            9: link((-400.0, -18.0), (-150.0, -14.0), GORE),
+            7: link((-700.0, -150.0), (-550.0, -50.0), (-400.0, -18.0)),
+        },
+        "2 3 4",
+        "8 9",
+        1,
+    ),
+    osm(
+        "frontage road",
+        {
+            **main(0, 250, lanes=(2, 3, 2)),
+            9: link((-500.0, -60.0), (-200.0, -20.0), GORE),
+            8: road((FAR, -60.0), (-500.0, -60.0), (END, -60.0), kind="secondary", maxspeed="60"),
+        },
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm("ramp meter", {**main(0, 250, lanes=(2, 3, 2)), 9: RAMP}, "1 2 3", "9", 1, signals=[ON]),
+    osm(
+        "mph",
+        {**main(0, 250, lanes=(3, 4, 3), maxspeed="65 mph"), 9: link(IN, ON, GORE, maxspeed="45 mph")},
+        "1 2 3",
+        "9",
+        2,
+    ),
+    osm(
+        "no limit",
+        {**main(0, 300, lanes=(2, 3, 2), maxspeed="none"), 9: link(IN, ON, GORE, maxspeed="none")},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm("no limit, guessed lane", {**main(0, maxspeed="none"), 9: RAMP}, "1 2", "9", 1),
+    osm("130 km/h, guessed lane", {**main(0, maxspeed="130"), 9: RAMP}, "1 2", "9", 1),
+    osm(
+        "limit changes",
+        {**main(0, 250, 800, lanes=(2, 3, 2, 2)) | {4: road((800.0, 0.0), (END, 0.0), maxspeed="80")}, 9: RAMP},
+        "1 2 3 4",
+        "9",
+        1,
+    ),
+    osm(
+        "trunk road",
+        {**main(0, 250, lanes=(2, 3, 2), kind="trunk", maxspeed="100"), 9: link(IN, ON, GORE, kind="trunk_link")},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "trunk becomes motorway",
+        {**main(0, 250, lanes=(2, 3, 2)) | {1: road((FAR, 0.0), GORE, kind="trunk")}, 9: RAMP},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "link of several ways",
+        {
+            **main(0, 250, lanes=(2, 3, 2)),
+            8: link((-800.0, -200.0), IN, maxspeed="50"),
+            9: link(IN, ON, maxspeed="60"),
+            10: link(ON, GORE),
+        },
+        "1 2 3",
+        "8 9 10",
+        1,
+    ),
+    osm(
+        "last node of 45 degrees",
+        {**main(0, 250, lanes=(2, 3, 2)), 9: link((-600.0, -90.0), (-200.0, -12.0), (-10.0, -10.0), GORE)},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "rest area",
+        {
+            **main(0, 250, 800, lanes=(2, 3, 2, 2)),
+            9: RAMP,
+            8: link((800.0, 0.0), (950.0, -20.0), (1000.0, -60.0)),
+            7: road((1000.0, -60.0), (1100.0, -60.0), kind="service", maxspeed="30", access="no"),
+        },
+        "1 2 3 4",
+        "9",
+        1,
+    ),
+    osm(
+        "split of the motorway",
+        {
+            **main(0, 250, 900, lanes=(3, 4, 3, 2)),
+            9: RAMP,
+            8: road((900.0, 0.0), (1200.0, -60.0), (END, -400.0), lanes=1, ref="A 2"),
+        },
+        "1 2 3",
+        "9",
+        2,
+    ),
+    osm("exit lane that drops", {**main(0, 250, 900, lanes=(2, 3, 2, 1)), 9: RAMP, 8: exit_at(900)}, "1 2 3", "9", 1),
+    osm(
+        "left-hand traffic",
+        {
+            **main(0, 250, lanes=(2, 3, 2), maxspeed="70 mph"),
+            9: link((-600.0, 90.0), (-200.0, 20.0), GORE, maxspeed="50 mph"),
+        },
+        "1 2 3",
+        "9",
+        1,
+        left_hand=True,
+    ),
+    osm(
+        "left-hand traffic, exit after",
+        {
+            **main(0, 700, maxspeed="70 mph"),
+            9: link((-600.0, 90.0), (-200.0, 20.0), GORE),
+            8: link((700.0, 0.0), (850.0, 15.0), (1200.0, 120.0)),
+        },
+        "1 2 3",
+        "9",
+        1,
+        left_hand=True,
+    ),
+    osm("one lane", {**main(0, 250, lanes=(1, 2, 1)), 9: RAMP}, "1 2 3", "9", 0),
+    osm("five lanes", {**main(0, 250, lanes=(5, 6, 5)), 9: RAMP}, "1 2 3", "9", 4),
+    osm(
+        "in a bend",
+        {
+            1: road((FAR, -300.0), (-400.0, -60.0), GORE),
+            2: road(GORE, (150.0, 8.0), (300.0, 10.0), lanes=3),
+            3: road((300.0, 10.0), (700.0, -10.0), (1200.0, -150.0), (2100.0, -600.0)),
+            9: link((-500.0, -200.0), (-150.0, -50.0), GORE),
+        },
+        "1 2 3",
+        "9",
+        1,
+    ),
+]
+
+
+def net(
+    name: str,
+    edges: dict[str, tuple[Sequence[Point], int, float, Mapping[str, str]]],
+    main: str,
+    ramp: str,
+    from_left: int,
+    connections: Sequence[tuple[str, int, str, int]] = (),
+    options: Sequence[str] = (),
+    lane: bool = True,
+    **numbers: object,
+) -> Case:
+    def make(folder: Path) -> Path:
+        return sources.plain(folder, edges, connections, *options)
+
+    return Case(name, make, main.split(), ramp.split(), from_left, lane, numbers)
+
+
+def straight(
+    *stops: float, lanes: Sequence[int], speed: float = 30.0, side: float = -1.0
+) -> dict[str, tuple[Sequence[Point], int, float, Mapping[str, str]]]:
+    """Main road edges `m0`, `m1`, ..., split at x [m], and an on-ramp `r` that joins at 0 from below or above."""
+    ends = [FAR, *stops, END]
+    found: dict[str, tuple[Sequence[Point], int, float, Mapping[str, str]]] = {
+        f"m{n}": (((a, 0.0), (b, 0.0)), count, speed, {})
+        for n, (a, b, count) in enumerate(zip(ends[:-1], ends[1:], lanes, strict=True))
+    }
+    return found | {"r": (((-600.0, 90.0 * side), (-200.0, 20.0 * side), GORE), 1, 20.0, {})}
+
+
+OFF = (((700.0, 0.0), (850.0, -15.0), (1200.0, -120.0)), 1, 20.0, {})
+GUESS = ("--ramps.guess", "--ramps.ramp-length", "250")
+FAN = [("m0", lane, "m1", lane) for lane in range(6)] + [("r", 0, "m1", lane) for lane in range(6)]
+FAN_ALL = [("m0", lane, "m1", onto) for lane in range(6) for onto in range(6)] + FAN[6:]
+NETS = [
+    net("fan-out of the on-ramp", straight(0, lanes=(6, 6)), "m0 m1", "r", 5, FAN, lane=False),
+    net("fan-out of both", straight(0, lanes=(6, 6)), "m0 m1", "r", 5, FAN_ALL, lane=False),
+    net(
+        "fan-out beside a lane of its own",
+        straight(0, 300, lanes=(2, 3, 2)),
+        "m0 m1 m2",
+        "r",
+        1,
+        [
+            ("m0", 0, "m1", 0),
+            ("m0", 0, "m1", 1),
+            ("m0", 1, "m1", 2),
+            ("r", 0, "m1", 0),
+            ("r", 0, "m1", 1),
+            ("m1", 1, "m2", 0),
+            ("m1", 2, "m2", 1),
+        ],
+    ),
+    net("lane without types", straight(0, 300, lanes=(2, 3, 2)), "m0 m1 m2", "r", 1),
+    net("ramps.guess", straight(0, lanes=(2, 2)), "m0 m1-AddedOnRampEdge m1", "r", 1, (), GUESS),
+    net(
+        "ramps.guess with an exit",
+        straight(0, 700, lanes=(2, 2, 2)) | {"e": OFF},
+        "m0 m1-AddedOnRampEdge m1 m1-AddedOffRampEdge m2",
+        "r",
+        1,
+        (),
+        GUESS,
+    ),
+    net(
+        "ramps.guess with an exit, three lanes",
+        straight(0, 700, lanes=(3, 3, 3)) | {"e": OFF},
+        "m0 m1-AddedOnRampEdge m1 m1-AddedOffRampEdge m2",
+        "r",
+        2,
+        (),
+        GUESS,
+    ),
+    net(
+        "guessed lane too short for a fifth",
+        straight(0, lanes=(2, 2), speed=36.11),
+        "m0 m1-AddedOnRampEdge m1",
+        "r",
+        1,
+        (),
+        ("--ramps.guess",),
+    ),
+    net(
+        "taper, no lane",
+        straight(0, lanes=(2, 2)),
+        "m0 m1",
+        "r",
+        1,
+        [("m0", 0, "m1", 0), ("m0", 1, "m1", 1), ("r", 0, "m1", 0)],
+        lane=False,
+    ),
+    net(
+        "from the left",
+        straight(0, 300, lanes=(2, 3, 2), side=1.0),
+        "m0 m1 m2",
+        "r",
+        1,
+        [("m0", 0, "m1", 0), ("m0", 1, "m1", 1), ("r", 0, "m1", 2), ("m1", 0, "m2", 0), ("m1", 1, "m2", 1)],
+    ),
+    net("left-hand net", straight(0, 300, lanes=(2, 3, 2), side=1.0), "m0 m1 m2", "r", 1, (), ("--lefthand",)),
+    net(
+        "left-hand net, fan-out",
+        straight(0, lanes=(6, 6), side=1.0),
+        "m0 m1",
+        "r",
+        5,
+        FAN_ALL,
+        ("--lefthand",),
+        lane=False,
+    ),
+    net(
+        "50 km/h",
+        straight(0, 300, lanes=(2, 3, 2), speed=13.89) | {"r": (((-600.0, -90.0), (-200.0, -20.0), GORE), 1, 8.33, {})},
+        "m0 m1 m2",
+        "r",
+        1,
+    ),
+    net(
+        "45 degrees",
+        straight(0, 300, lanes=(2, 3, 2)) | {"r": (((-400.0, -400.0), GORE), 1, 20.0, {})},
+        "m0 m1 m2",
+        "r",
+        1,
+    ),
+    net(
+        "two-lane on-ramp without types",
+        straight(0, 400, lanes=(3, 5, 3)) | {"r": (((-600.0, -90.0), (-200.0, -20.0), GORE), 2, 20.0, {})},
+        "m0 m1 m2",
+        "r",
+        2,
+    ),
+    net(
+        "service road without car access",
+        straight(0, 300, 900, lanes=(2, 3, 2, 2))
+        | {"s": (((900.0, 0.0), (1200.0, -20.0), (2000.0, -100.0)), 2, 30.0, {"allow": "emergency authority"})},
+        "m0 m1 m2 m3",
+        "r",
+        1,
+    ),
+    net(
+        "exit after as wide as the road",
+        straight(0, 300, 900, lanes=(2, 3, 4, 2))
+        | {"e": (((900.0, 0.0), (1100.0, -30.0), (1600.0, -200.0)), 2, 25.0, {})},
+        "m0 m1 m2 m3",
+        "r",
+        1,
+        [
+            ("m0", 0, "m1", 1),
+            ("m0", 1, "m1", 2),
+            ("r", 0, "m1", 0),
+            ("m1", 1, "m2", 2),
+            ("m1", 2, "m2", 3),
+            ("m2", 0, "e", 0),
+            ("m2", 1, "e", 1),
+            ("m2", 2, "m3", 0),
+            ("m2", 3, "m3", 1),
+        ],
+    ),
+    net(
+        "through OpenDRIVE's width of lanes",
+        straight(0, 300, lanes=(3, 4, 3)),
+        "m0 m1 m2",
+        "r",
+        2,
+        (),
+        ("--default.lanewidth", "3.75"),
+    ),
+]
+CORPUS = OSM + NETS
