@@ -78,6 +78,7 @@ class Rollout(ReactingDriver, Acc):
         progress: Cost of a second.
         effort: Cost of braking [s^3/m^2].
         sudden: Cost of a policy without a bound on the jerk [s].
+        reacts: Drivers plan anew in each step; if not (an ablation), they keep their first plan to the merging point.
         commitment: How much cheaper another policy must be to be taken.
         max_jerk: Largest change of the command but for an escape [m/s^3].
         escape: Keep an escape.
@@ -104,6 +105,7 @@ class Rollout(ReactingDriver, Acc):
     progress: NonNegativeFloat = 1.0
     effort: NonNegativeFloat = 0.1
     sudden: NonNegativeFloat = 0.1
+    reacts: bool = True
     commitment: NonNegativeFloat = 0.2
     max_jerk: PositiveFloat = 3.0
     escape: bool = True
@@ -158,6 +160,7 @@ class Rollout(ReactingDriver, Acc):
             self.progress,
             self.effort,
             self.sudden,
+            self.reacts,
         )
         self._bounds = Bounds(
             self.min_acceleration,

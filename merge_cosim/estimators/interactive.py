@@ -49,7 +49,7 @@ class Interactive(ReactingDriver, Estimator):
     white: NonNegativeFloat = 0.1
     outlier: Share = 0.05
     reaction_time: NonNegativeFloat = 1.0
-    change_rate: NonNegativeFloat = 0.05
+    change_rate: NonNegativeFloat = 0.15
     start_yield: Share = 0.38
     start_not_yield: Share = 0.4
     start_ignore: Share = 0.2

@@ -78,6 +78,18 @@ def test_slowing_down_for_a_driver_that_yields_slows_the_driver():
     assert by_type[POLICIES.index("free"), 1] > by_type[POLICIES.index("follow"), 1]
 
 
+def test_drivers_that_keep_their_first_plan_are_the_ablation():
+    """A yielding driver that brakes for a host at constant speed is passed by a host that slows down."""
+    seen = one(-60, 18, -58, 17)
+    found = []
+    for reacts in (True, False):
+        made = planner(least_belief=0.0, reacts=reacts)
+        made.command(seen, np.zeros(1), np.ones(1, bool))
+        found.append(made.last_costs[0, POLICIES.index("coast"), [0, 2]])
+    assert found[0][0] != found[1][0]
+    assert found[0][1] == found[1][1]  # a driver that ignores the host does not react anyway
+
+
 def test_commitment_keeps_the_policy_until_another_is_cheaper_by_that_much():
     seen, odds, target = one(-60, 18, -58, 17), np.zeros(1), np.ones(1, bool)
     for commitment, keeps in ((0.0, False), (1e6, True)):

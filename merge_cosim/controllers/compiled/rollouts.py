@@ -36,6 +36,7 @@ class HostLaw(NamedTuple):
     progress: float
     effort: float
     sudden: float
+    reacts: bool
 
 
 @njit(cache=True)
@@ -97,6 +98,7 @@ def rollout(
     surest = 1e9
     effort = 0.0
     acceleration = last
+    unmoved = reacting(kind, margin, host_station, host_speed, host_length, station, speed, law)
     reached = -1.0
     both = -1
     time = 0.0
@@ -107,7 +109,9 @@ def rollout(
             wanted = min(max(wanted, acceleration - change), acceleration + change)
         acceleration = wanted
         driver = 0.0
-        if time >= delay:
+        if time >= delay and not host.reacts:
+            driver = unmoved if station < -TOL else 0.0
+        elif time >= delay:
             driver = reacting(kind, margin, host_station, host_speed, host_length, station, speed, law)
         before = host_speed
         host_speed = max(host_speed + acceleration * host.step, 0.0)
