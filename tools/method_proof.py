@@ -1,0 +1,173 @@
+"""Bring the page of `interactive` up to date: python tools/method_proof.py [--data DIR] [--only NAME ...].
+
+The blocks `<!-- proof: NAME -->` ... `<!-- end -->` of docs/methods/interactive.md are tables of sweeps, each with the
+command that gives the same figures. `<!-- choice: CASE -->` shows why policies were chosen in a case of Designed Test
+III.
+Without --data, tables of logged cars stay as they are.
+"""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from blocks import fill_page, page_parser, table
+
+import merge_cosim as mc
+from merge_cosim.controllers.rollout import POLICIES, Rollout
+from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.estimators.driver_types import DRIVER_TYPES
+from merge_cosim.estimators.interactive import Interactive
+from merge_cosim.simulation.host_driver import HostDriver
+
+RIVALS = ["interactive", "acc", "slot", "slot-time", "pgm", "fg-gmm", "dbn-pf", "ipcb"]
+NARROW = {"speed_limit": 12, "encounters.length": 7}
+SEED = "encounters.seed", "merging.seed"
+
+
+@dataclass(frozen=True)
+class Study:
+    """Sweeps whose rows are laid together.
+
+    Attributes:
+        scenarios: Scenarios, or a family.
+        methods: Methods.
+        settings: Settings of each sweep, one sweep after the other.
+        logged: It needs real data.
+    """
+
+    scenarios: list[str]
+    methods: list[str]
+    settings: list[dict[str, Any]] = field(default_factory=lambda: [{}])
+    logged: bool = False
+
+    def command(self, settings: dict[str, Any]) -> str:
+        """The same sweep on the command line."""
+        words = ["merge-cosim", "sweep", *self.scenarios, "--method", ",".join(self.methods), "--world", "closed-form"]
+        words += [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
+        return shlex.join([*words, "--out", "out/proof"])
+
+
+PLANNERS = ["interactive+acc", "interactive+pcb", "slot-time+rollout", "pgm+rollout", "dbn-pf+rollout", "ipcb+rollout"]
+ABLATIONS: list[dict[str, Any]] = [
+    {},
+    {"rollout.reacts": False},
+    {"rollout.commitment": 0.0},
+    {"rollout.escape": False},
+    {"rollout.tolerated_risk": 0.0},
+    {"rollout.overlap": 1000.0},
+    {"rollout.spread_rate": 0.0},
+]
+STUDIES = {
+    "designed": Study(["designed-2"], RIVALS),
+    "narrow": Study(["designed-2"], RIVALS, [NARROW]),
+    "designed-1": Study(["designed-1"], RIVALS, logged=True),
+    "hidden": Study(["designed-3"], [*RIVALS, "oracle-label", "always-go", "always-yield", "oracle-best"]),
+    "seeds": Study(["designed-3"], ["interactive"], [dict.fromkeys(SEED, seed) for seed in range(5, 10)]),
+    "shifted": Study(["shifted"], ["interactive", "acc", "slot", "slot-time", "pgm", "ipcb"]),
+    "replay": Study(["us101-replay"], [*RIVALS, "human"], logged=True),
+    "planners": Study(["designed-3"], ["interactive", *PLANNERS, "oracle-label+rollout"]),
+    "ablations": Study(["designed-3"], ["interactive"], ABLATIONS),
+}
+
+
+def shown(settings: dict[str, Any]) -> str:
+    """Settings in a cell."""
+    return ", ".join(f"`{key}={value}`" for key, value in settings.items())
+
+
+def proof(name: str, short: bool, data: Path | None) -> str | None:
+    """The table of one study."""
+    study = STUDIES[name]
+    if study.logged and data is None:
+        return None
+    head = ["scenario", "method", "settings", "n", "failed", "stuck", "failed or stuck [%]", "delay [s]", "D [m]"]
+    head += ["hardest braking [m/s²]", "jerk [m/s³]"]
+    rows = []
+    for settings in study.settings:
+        given = settings | ({"encounters.count": 20} if short and "designed-3" in study.scenarios else {})
+        found = mc.sweep(
+            study.scenarios, study.methods, settings=given, data=data, world="closed-form", progress=False
+        ).summary()
+        for row in found.sort_values("scenario", kind="stable").itertuples():
+            interval = f"{row.failed_or_stuck_pct:.2f}"
+            if pd.notna(row.failed_or_stuck_low_pct):
+                interval += f" ({row.failed_or_stuck_low_pct:.2f} to {row.failed_or_stuck_high_pct:.2f})"
+            rows.append(
+                [
+                    row.scenario + (f" ({row.source})" if study.logged else ""),
+                    row.method,
+                    shown(settings),
+                    str(row.n),
+                    str(row.failures),
+                    str(row.stuck),
+                    interval,
+                    f"{row.delay_s:.3f}",
+                    f"{row.distance_m:.1f}",
+                    f"{row.hardest_braking:.2f}",
+                    f"{row.mean_jerk:.2f}",
+                ]
+            )
+    if not any(row[2] for row in rows):
+        head, rows = head[:2] + head[3:], [row[:2] + row[3:] for row in rows]
+    return f"`{study.command(study.settings[0])}`\n\n{table(head, rows, left=len(head) - 8)}"
+
+
+def choice(case: str) -> str:
+    """What each policy costs against each driver, every second of a case of Designed Test III."""
+    seed = int(case.split("-")[1])
+    settings = dict.fromkeys(SEED, seed)
+    run = mc.run("designed-3", case, "interactive", settings=settings, world="closed-form")
+    driver = HostDriver(Interactive(), Rollout())
+    driver.start(1, Setting())
+    driver.reset(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(1, np.uint64))
+    text = ""
+    for k, row in enumerate(run.traces.itertuples()):
+        cars = row.host_station_m, row.host_speed, row.merging_station_m, row.merging_speed, 5.0, 5.0
+        seen = Observation(*(np.array([value]) for value in cars))
+        if seen.merging_in_lane[0]:
+            break
+        driver.decide(seen)
+        planner = driver.controller
+        if k % 10:
+            continue
+        belief = planner.last_belief[0]
+        text += f"{k / 10:.0f} s, host at {cars[0]:.0f} m and {cars[1]:.1f} m/s, merging car at {cars[2]:.0f} m and "
+        text += f"{cars[3]:.1f} m/s; driven: **{POLICIES[planner.last_policy[0]]}**\n\n"
+        rows = [
+            [
+                name,
+                *(f"{value:.2f}" for value in planner.last_costs[0, number]),
+                f"{planner.last_costs[0, number] @ belief:.2f}",
+            ]
+            for number, name in enumerate(POLICIES)
+        ]
+        head = [
+            "policy",
+            *(f"{kind} ({share:.2f})" for kind, share in zip(DRIVER_TYPES, belief, strict=True)),
+            "expected",
+        ]
+        text += table(head, rows) + "\n"
+    return text
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Fill the page's blocks."""
+    parser = page_parser(__doc__)
+    parser.add_argument("--data", type=Path, help="folder with real NGSIM files")
+    parser.add_argument("--only", nargs="*", choices=[*STUDIES, "choice"], help="blocks to fill; all, if not given")
+    given = parser.parse_args(argv)
+    wanted = given.only or [*STUDIES, "choice"]
+
+    def proof_or_stay(name: str) -> str | None:
+        return proof(name, given.short, given.data) if name in wanted else None
+
+    kinds = {"proof": proof_or_stay, "choice": lambda case: choice(case) if "choice" in wanted else None}
+    fill_page("methods/interactive.md", given.docs, kinds)
+
+
+if __name__ == "__main__":
+    main()
