@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -12,7 +15,7 @@ WIDTH, HEIGHT = 5.4, 3.4
 """Size of a single panel [in]: half a page's width on a desk, all of it on a phone."""
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
-    "axes.titlesize": 9.0,
+    "axes.titlesize": "medium",
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -20,7 +23,8 @@ STYLE: dict[Any, Any] = {
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "legend.frameon": False,
-    "legend.fontsize": 8.0,
+    "legend.fontsize": "small",
+    "pdf.fonttype": 42,
     "lines.linewidth": 1.6,
     "svg.hashsalt": "merge-cosim",
 }
@@ -28,13 +32,44 @@ FAILED = "#c1121f"
 """Colour of failures that no method's colour marks."""
 
 
+@dataclass(frozen=True)
+class Paper:
+    """What figures are made for.
+
+    Attributes:
+        width: Width of every figure [in]; None for each figure's own.
+        font: Size of the type [pt].
+    """
+
+    width: float | None = None
+    font: float = 9.0
+
+
+DESK = Paper()
+_PAPER: ContextVar[Paper] = ContextVar("paper", default=DESK)
+LEAST_CELL = 1.4
+"""Least width of a small panel [in]."""
+
+
+@contextmanager
+def made_for(paper: Paper) -> Iterator[None]:
+    """Context in which every figure has a paper's width and type."""
+    token = _PAPER.set(paper)
+    try:
+        yield
+    finally:
+        _PAPER.reset(token)
+
+
 def style() -> Any:
     """Context in which a figure is made."""
-    return mpl.rc_context(STYLE)
+    return mpl.rc_context({**STYLE, "font.size": _PAPER.get().font})
 
 
 def panel(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Any]:
     """Make a figure with one set of axes."""
+    wanted = _PAPER.get().width or width
+    width, height = wanted, height * max(wanted / width, 0.7)
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.add_subplot()
 
@@ -49,6 +84,10 @@ def grid_of(count: int, across: int, cell: tuple[float, float], sharex: bool = T
         sharex: They share the horizontal axis, too.
     """
     across = min(across, count)
+    wanted = _PAPER.get().width
+    if wanted is not None:
+        across = min(across, max(1, int(wanted / LEAST_CELL)))
+        cell = wanted / across, cell[1] * min(wanted / across / cell[0], 1.5)
     down = -(-count // across)
     figure = Figure(figsize=(cell[0] * across, cell[1] * down), layout="constrained")
     axes = figure.subplots(down, across, sharex=sharex, sharey=True, squeeze=False).ravel().tolist()
@@ -70,5 +109,5 @@ def broken(name: str, most: int = 18) -> str:
 
 def columns_for(labels: Sequence[str], figure: Figure) -> int:
     """Columns of a legend below a figure in which the longest label fits."""
-    width = 0.085 * mpl.rcParams["legend.fontsize"] / 8.0 * max(map(len, labels), default=1) + 0.5
+    width = 0.0085 * mpl.rcParams["font.size"] * max(map(len, labels), default=1) + 0.5
     return max(1, min(4, int(figure.get_figwidth() / width)))

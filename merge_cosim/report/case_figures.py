@@ -112,7 +112,10 @@ def _draw(paths: list[_Path], looks: Mapping[str, Look], quantity: str, label: s
 
 
 def _legend(figure: Figure) -> None:
-    figure.legend(loc="outside lower center", ncols=2, handlelength=1.8, columnspacing=1.2)
+    labels = [str(line.get_label()) for line in figure.axes[0].lines]
+    longest = [line for label in labels for line in label.split("\n")]
+    columns = canvas.columns_for(longest, figure)
+    figure.legend(loc="outside lower center", ncols=columns, handlelength=1.8, columnspacing=1.2)
 
 
 def _paths(traces: pd.DataFrame, failed: Mapping[str, bool]) -> list[_Path]:

@@ -130,8 +130,10 @@ def chapter(
 
 def _notes(section: Section, rows: pd.DataFrame, scenario: dict[str, Any], manifest: dict[str, Any]) -> list[str]:
     notes = []
-    models = rows[rows["model"] != ""].groupby("model")["method"].unique()
-    notes += [f"Model {model}: {', '.join(in_order(methods))}." for model, methods in models.items()]
+    models: dict[str, list[str]] = {}
+    for model, methods in rows[rows["model"] != ""].groupby("model")["method"].unique().items():
+        models.setdefault(", ".join(in_order(methods)), []).append(str(model))
+    notes += [f"Model{'s' * (len(names) > 1)} {', '.join(names)}: {methods}." for methods, names in models.items()]
     if section.source == "surrogate":
         notes.append("Every pair is made by SUMO, also where the text above speaks of a log: no real car is in it.")
     if section.source not in NO_SITES and scenario["merging"]["model"] != "replay":

@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pandas as pd
 
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.registry import did_you_mean
+
 MISSING = "–"
-LATEX_SIGNS = {"−": "$-$", "–": "--", "µ": r"$\mu$", "≥": r"$\geq$", "²": "$^2$", "<": "$<$"}
+LATEX_SIGNS = {sign: f"\\{sign}" for sign in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "|": "$|$",
+    "<": "$<$",
+    "−": "$-$",
+    "–": "--",
+    "µ": r"$\mu$",
+    "≥": r"$\geq$",
+    "²": "$^2$",
+    "³": "$^3$",
+    ">": "$>$",
+}
 
 
 @dataclass(frozen=True)
@@ -31,6 +47,7 @@ class Column:
     decimals: int | None = None
     group: str = ""
     prose: bool = False
+    better: int = 0
     range: bool = False
     probability: bool = False
 
@@ -90,18 +107,57 @@ class Table:
                 spans.append((column.group, 1))
         return spans
 
-    def latex(self) -> str:
-        """The table in LaTeX with booktabs rules."""
-        keys = pd.MultiIndex.from_tuples([(column.group, column.heading) for column in self.columns])
-        frame = pd.DataFrame(self.cells, columns=keys).replace(MISSING, "--")
-        if not any(column.group for column in self.columns):
-            frame.columns = keys.get_level_values(1)
+    def best(self) -> list[list[bool]]:
+        """Which cells, row by row, hold the best value of their column; references do not compete."""
+        competes = ~pd.Series(self.apart, dtype=bool)
+        marks = []
+        for column in self.columns:
+            if not column.better:
+                marks.append([False] * len(self.data))
+                continue
+            values = pd.to_numeric(self.data[column.name], errors="coerce").where(competes).round(column.decimals or 0)
+            values *= column.better
+            marks.append((values.eq(values.max()) & (values.nunique() > 1)).tolist())
+        return list(map(list, zip(*marks, strict=True)))
+
+    def choose(self, names: Sequence[str]) -> Table:
+        """The table with these columns only, in this order, behind its first.
+
+        Raises:
+            UserError: There is no such column.
+        """
+        known = {column.name: column for column in self.columns}
+        for name in names:
+            if name not in known:
+                raise UserError(f"--columns: no column '{name}' in {self.title!r}{did_you_mean(name, list(known))}")
+        kept = [self.columns[0], *(known[name] for name in names if name != self.columns[0].name)]
+        return replace(self, columns=tuple(kept), data=self.data[[column.name for column in kept]])
+
+    def latex(self, label: str = "") -> str:
+        """The table in LaTeX with booktabs rules, best values in bold.
+
+        Args:
+            label: Name for cross-references; none, if empty.
+        """
+        keys = [(_escaped(column.group), _escaped(column.heading)) for column in self.columns]
+        cells = [
+            [f"\\textbf{{{_escaped(text)}}}" if bold else _escaped(text) for text, bold in zip(*row, strict=True)]
+            for row in zip(self.cells, self.best(), strict=True)
+        ]
+        grouped = any(column.group for column in self.columns)
+        headings = pd.MultiIndex.from_tuples(keys) if grouped else pd.Index([heading for _, heading in keys])
         forms = {True: "p{0.3\\textwidth}", False: "l"}
-        form = "".join(forms[column.prose] if column.decimals is None else "r" for column in self.columns)
-        caption = self.title.replace("_", r"\_")
-        text: str = frame.to_latex(
-            index=False, escape=True, column_format=form, multicolumn_format="c", caption=caption
+        text: str = pd.DataFrame(cells, columns=headings).to_latex(
+            index=False,
+            escape=False,
+            column_format="".join(forms[c.prose] if c.decimals is None else "r" for c in self.columns),
+            multicolumn_format="c",
+            caption=_escaped(self.title),
+            label=label or None,
         )
-        for sign, command in LATEX_SIGNS.items():
-            text = text.replace(sign, command)
         return text
+
+
+def _escaped(text: str) -> str:
+    """Text in which no sign has a meaning in LaTeX."""
+    return "".join(LATEX_SIGNS.get(sign, sign) for sign in text)

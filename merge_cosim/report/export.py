@@ -12,7 +12,7 @@ FOLDER = "tables"
 
 
 def write_tables(folder: Path, tables: Mapping[str, Table]) -> list[Path]:
-    """Write each table as `tables/NAME.csv` and `tables/NAME.tex`; returns the files.
+    """Write each table as `tables/NAME.csv` and `tables/NAME.tex` with the label `tab:NAME`; returns the files.
 
     Args:
         folder: Result folder.
@@ -22,9 +22,14 @@ def write_tables(folder: Path, tables: Mapping[str, Table]) -> list[Path]:
     target.mkdir(parents=True, exist_ok=True)
     files = []
     for name, table in tables.items():
-        stem = re.sub(r"[^\w.-]+", "-", name)
+        stem = file_stem(name)
         csv, tex = target / f"{stem}.csv", target / f"{stem}.tex"
         table.data.to_csv(csv, index=False)
-        tex.write_text(table.latex(), encoding="utf-8")
+        tex.write_text(table.latex(f"tab:{stem}"), encoding="utf-8")
         files += [csv, tex]
     return files
+
+
+def file_stem(name: str) -> str:
+    """A name as that of a file."""
+    return re.sub(r"[^\w.-]+", "-", name)

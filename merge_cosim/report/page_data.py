@@ -56,7 +56,7 @@ def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, said: Verdict) -> li
             {
                 "method": method,
                 "reference": is_reference(method),
-                "best": method in said.best and len(said.order) > 1,
+                "best": method in said.best and len(said.best) < len(said.order),
                 "undecided": method in said.undecided and method not in said.best,
                 "models": len(own),
                 "n": int(own["n"].iloc[0]),

@@ -22,24 +22,27 @@ MAIN = (
     METHOD,
     MODEL,
     Column("n", "n", 0, "failures"),
-    Column("failures", "count", 0, "failures"),
-    Column("failure_pct", "%", 2, "failures"),
+    Column("failures", "count", 0, "failures", better=-1),
+    Column("failure_pct", "%", 2, "failures", better=-1),
     Column("interval_pct", "95 % interval", None, "failures"),
-    Column("failure_pct_own", "% without rear-end hits", 2, "failures"),
+    Column("failure_pct_own", "% without rear-end hits", 2, "failures", better=-1),
     Column("censored", "censored", 0, "failures"),
     Column("bounds_pct", "% best–worst", None, "failures"),
+    Column("stuck", "stuck", 0, "failed or stuck", better=-1),
+    Column("failed_or_stuck_pct", "%", 2, "failed or stuck", better=-1),
+    Column("stuck_interval_pct", "95 % interval", None, "failed or stuck"),
     Column("published_failure_pct", "%", 1, "published"),
     Column("published_distance_m", "D m", 1, "published"),
-    Column("host_not_reached", "never arrived", 0, "host at the merging point"),
+    Column("host_not_reached", "never arrived", 0, "host at the merging point", better=-1),
     Column("distance_m", "D m", 1, "host at the merging point"),
     Column("distance_m_safe", "D m, not failed", 1, "host at the merging point"),
     Column("gap_m", "gap m", 1, "host at the merging point"),
-    Column("delay_s", "delay s", 2, "cost"),
-    Column("hardest_braking", "brake m/s²", 2, "cost"),
-    Column("hardest_braking_p95", "brake 95 % m/s²", 2, "cost"),
-    Column("unnecessary_yields", "needless yields", 0, "cost"),
+    Column("delay_s", "delay s", 2, "cost", better=-1),
+    Column("hardest_braking", "brake m/s²", 2, "cost", better=-1),
+    Column("hardest_braking_p95", "brake 95 % m/s²", 2, "cost", better=-1),
+    Column("unnecessary_yields", "needless yields", 0, "cost", better=-1),
     Column("decision_flips", "flips", 2, "decision"),
-    Column("correct_at_merge_pct", "correct %", 1, "decision"),
+    Column("correct_at_merge_pct", "correct %", 1, "decision", better=1),
     Column("cycle_us", "batch", 2, "cycle µs"),
     Column("cycle_us_single", "alone", 1, "cycle µs"),
 )
@@ -77,6 +80,7 @@ def summary_frame(rows: list[dict[str, Any]], variations: Sequence[str] = ()) ->
         [figure.distance_m if figure else None for figure in figures], dtype=float
     )
     frame["interval_pct"] = ranges(frame["ci_low_pct"], frame["ci_high_pct"])
+    frame["stuck_interval_pct"] = ranges(frame["failed_or_stuck_low_pct"], frame["failed_or_stuck_high_pct"])
     censored = frame["censored"] > 0
     frame["bounds_pct"] = ranges(frame["failure_pct_best"].where(censored), frame["failure_pct_worst"].where(censored))
     differs = frame["failure_pct_own"].ne(frame["failure_pct"]) & frame["failure_pct"].notna()

@@ -86,8 +86,8 @@ def _outcome(rows: pd.DataFrame, key: tuple[Any, ...]) -> dict[str, Any]:
         "failed": bool(row["failed"]),
         "outcome": outcome + kind,
         "delay": round(float(row["delay_s"]), 2),
-        "host_speed_0": float(row["host_speed_0"]),
-        "merging_speed_0": float(row["merging_speed_0"]),
+        "host_speed_0": round(float(row["host_speed_0"]), 2),
+        "merging_speed_0": round(float(row["merging_speed_0"]), 2),
     }
 
 

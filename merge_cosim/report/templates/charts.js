@@ -10,9 +10,8 @@ function tradeoff(element, rows, width) {
   const inside = rivals.length ? rivals : known;
   const ends = (low, value, high) => inside.flatMap((row) => [row[low], row[value], row[high]].filter((one) => one !== null));
   const delays = ends("delay_low", "delay", "delay_high"), shares = ends("bad_low", "bad_pct", "bad_high");
-  const [left, right] = [Math.min(...delays), Math.max(...delays)];
-  const room = Math.max((right - left) * 0.15, 0.1);
-  const x = [left >= 0 ? Math.max(left - room, 0) : left - room, right + room * 1.6];
+  const [left, right] = [Math.min(0, ...delays), Math.max(...delays, 0.1)];
+  const x = [left, right + (right - left) * 0.2];
   const y = [0, Math.min(Math.max(...shares, 1) * 1.12, 104)];
   const f = frame(width, height, x, y, { xLabel: "mean delay [s]", yLabel: "failed or stuck [%]", label: "Failed or stuck against mean delay, a dot per method; the numbers are in the table" });
   const dots = known.map((row) => {
@@ -26,8 +25,9 @@ function tradeoff(element, rows, width) {
     if (row.bad_low !== null) bar(f.sx(row.delay), f.sx(row.delay), f.sy(Math.max(row.bad_low, y[0])), f.sy(Math.min(row.bad_high, y[1])));
     if (row.delay_low !== null) bar(f.sx(Math.max(row.delay_low, x[0])), f.sx(Math.min(row.delay_high, x[1])), f.sy(row.bad_pct), f.sy(row.bad_pct));
   }
-  f.boxes = [...dots.map((dot) => [dot.x - 7, dot.y - 7, dot.x + 7, dot.y + 7]), ...spans];
-  for (const dot of dots) placeLabel(f, dot, dots.indexOf(dot));
+  f.boxes = dots.map((dot) => [dot.x - 8, dot.y - 8, dot.x + 8, dot.y + 8]);
+  f.spans = spans;
+  for (const dot of dots) placeLabel(f, dot);
   for (const { row, off, x: px, y: py } of dots) {
     const shape = { class: `dot m pick${row.reference ? " hollow" : ""}`, style: look(row.method), "data-method": row.method, "data-watch": row.method };
     const turn = row.delay > x[1] ? 0 : row.delay < x[0] ? 180 : -90;
@@ -39,25 +39,26 @@ function tradeoff(element, rows, width) {
 }
 
 // Put the name beside its dot where it covers neither another name nor a dot; further away with a thin line.
-function placeLabel(f, dot, own) {
+function placeLabel(f, dot, most = 99) {
   const { row, off } = dot;
-  const text = row.method + (row.best ? " ★" : "") + (off ? ` (${row.delay.toFixed(1)} s, ${row.bad_pct.toFixed(0)} %)` : "");
+  const name = row.method.length > most ? `${row.method.slice(0, most)}…` : row.method;
+  const text = name + (row.best ? " ★" : "") + (off ? ` (${row.delay.toFixed(1)} s, ${row.bad_pct.toFixed(0)} %)` : "");
   const w = textWidth(text), h = TEXT_HEIGHT;
   let best = null;
-  for (const reach of [9, 18, 30, 44, 60, 80, 105, 135]) {
+  for (const reach of [10, 16, 22, 30, 44, 60, 80, 105, 135]) {
     for (let turn = 0; turn < 16; turn++) {
       const angle = (turn * Math.PI) / 8, cx = dot.x + reach * Math.cos(angle), cy = dot.y - reach * Math.sin(angle);
       const x0 = Math.abs(Math.cos(angle)) < 0.3 ? cx - w / 2 : Math.cos(angle) > 0 ? cx : cx - w;
       const box = [x0, cy - h / 2, x0 + w, cy + h / 2];
       if (box[0] < f.margin.left || box[2] > f.width - 2 || box[1] < 0 || box[3] > f.height - f.margin.bottom - 1) continue;
-      const cover = f.boxes.reduce((sum, other, i) => sum + (i === own ? 0 : overlap(box, other)), 0);
-      const cost = reach + 20 * cover;
+      const covered = (boxes) => boxes.reduce((sum, other) => sum + overlap(box, other), 0);
+      const cost = reach + 20 * covered(f.boxes) + 0.3 * covered(f.spans);
       if (!best || cost < best.cost) best = { cost, box, cx, cy, reach };
     }
   }
-  if (!best) return;
+  if (!best) return most > 12 ? placeLabel(f, dot, 12) : undefined;
   f.boxes.push(best.box);
-  if (best.reach > 20) {
+  if (best.reach > 22) {
     const end = [clamp(dot.x, best.box[0], best.box[2]), clamp(dot.y, best.box[1] + 3, best.box[3] - 3)];
     f.root.append(svg("line", { class: "lead-line", "data-method": row.method, x1: dot.x, y1: dot.y, x2: end[0], y2: end[1] }));
   }

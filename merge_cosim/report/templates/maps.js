@@ -7,7 +7,7 @@ const heat = (share) => {
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 function panels(element, methods, draw) {
-  element.classList.toggle("few", methods.length < 3);
+  if (methods.length < 7) element.classList.add(methods.length < 3 ? "few" : "some");
   for (const method of methods) {
     const box = html("div", { class: "map", "data-method": method });
     const canvas = html("canvas", { role: "img" });
@@ -131,7 +131,8 @@ function failureMaps(element, map, cases, readout) {
   }
   const bar = html("p", { class: "scale" });
   const stripe = html("i", { style: `background:linear-gradient(to right, ${HEAT.map((_, i) => heat(i / (HEAT.length - 1))).join(",")})` });
-  bar.append("0 %", stripe, `${Math.round(1000 * top) / 10} % of the cases failed`);
+  if (methods.some((method) => map.failed[method].some(Boolean))) bar.append("0 %", stripe, `${Math.round(1000 * top) / 10} % of the cases failed`);
+  else bar.append("No case failed.");
   element.append(bar);
 }
 

@@ -82,7 +82,7 @@ function drawRoad(runs) {
       root.append(svg("path", { class: "edge", d: `M${until.map((s) => `${sx(s)} ${ramp(s) + side * (LANE / 2 + 1)}`).join("L")}` }));
     }
     root.append(svg("rect", { class: "road", x: sx(low), width: sx(high) - sx(low), y: y - LANE / 2 - 1, height: LANE + 2 }));
-    root.append(svg("line", { class: "edge", x1: sx(low), x2: sx(high), y1: y - LANE / 2 - 1, y2: y - LANE / 2 - 1 }), svg("line", { class: "edge", x1: sx(0), x2: sx(high), y1: y + LANE / 2 + 1, y2: y + LANE / 2 + 1 }), svg("line", { class: "edge", x1: sx(low), x2: sx(-17), y1: y + LANE / 2 + 1, y2: y + LANE / 2 + 1 }));
+    root.append(svg("line", { class: "edge", x1: sx(low), x2: sx(high), y1: y - LANE / 2 - 1, y2: y - LANE / 2 - 1 }), svg("line", { class: "edge", x1: sx(0), x2: sx(high), y1: y + LANE / 2 + 1, y2: y + LANE / 2 + 1 }), svg("line", { class: "edge", x1: sx(low), x2: sx(-24), y1: y + LANE / 2 + 1, y2: y + LANE / 2 + 1 }));
     root.append(svg("line", { class: "cursor", x1: sx(0), x2: sx(0), y1: y - 16, y2: y + 26 }));
     for (const run of row) if (!together) root.append(svg("text", { class: "strong", x: 4, y: y - 14 }, `${run.method}: ${run.outcome}`));
     if (i === rows.length - 1) for (const s of steps) root.append(svg("text", { class: "tick", x: clamp(sx(s), 14, width - 16), y: height - 4, "text-anchor": "middle" }, s === 0 ? "merging point" : `${written(s)} m`));
