@@ -224,6 +224,34 @@ class Results:
         shutil.copyfile(page, target)
         return target
 
+    def figures(
+        self,
+        out: str | Path,
+        width_cm: float | None = None,
+        font_size: float = 9.0,
+        columns: Sequence[str] = (),
+    ) -> list[Path]:
+        """Write every figure for a paper: SVG, PDF, PNG and its data as CSV; the tables as LaTeX and CSV.
+
+        Example:
+            >>> results.figures("paper/figures", width_cm=8.4)  # doctest: +SKIP
+
+        Args:
+            out: The folder; the tables go to `tables/` in it.
+            width_cm: Width of every figure [cm]; each figure's own, if not given.
+            font_size: Size of the type [pt].
+            columns: Columns of the tables of outcomes; all, if not given.
+
+        Returns:
+            The files.
+
+        Raises:
+            UserError: The folder holds no finished sweep, or there is no such column.
+        """
+        from merge_cosim.report.figures import write_figures
+
+        return write_figures(self.path, Path(out), width_cm, font_size, columns)
+
     def __len__(self) -> int:
         return len(self.rows)
 

@@ -7,7 +7,6 @@ import typer
 
 from merge_cosim.cli.options import (
     Against,
-    Columns,
     Data,
     ForceSource,
     Jobs,
@@ -16,10 +15,9 @@ from merge_cosim.cli.options import (
     Plugins,
     Seed,
     Sets,
-    Wide,
     World,
 )
-from merge_cosim.cli.show import print_json, show_results, show_table, show_verification, verification
+from merge_cosim.cli.show import print_json, show_table, show_verification, verification
 
 app = typer.Typer()
 
@@ -28,32 +26,34 @@ app = typer.Typer()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
     against: Against = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(help="Write every figure as SVG, PDF, PNG and CSV, and the tables, to this folder instead."),
+    ] = None,
+    width: Annotated[float | None, typer.Option(min=4.0, max=60.0, help="With --figures: their width [cm].")] = None,
+    font_size: Annotated[float, typer.Option(min=4.0, max=24.0, help="With --figures: size of the type [pt].")] = 9.0,
+    columns: Annotated[
+        str | None,
+        typer.Option(help="With --figures: columns of the tables of outcomes: n,failure_pct,delay_s."),
+    ] = None,
     json: Json = False,
 ) -> None:
-    """Make one offline HTML page of a sweep: tables, failure maps, one case in detail."""
+    """Make one offline HTML page of a sweep: verdict, tables, failure maps, recorded cases; or figures for a paper."""
     from merge_cosim.api.results import Results
 
-    file = Results(folder).report(against=against)
+    results = Results(folder)
+    if figures is not None:
+        files = results.figures(figures, width, font_size, columns.split(",") if columns else ())
+        if json:
+            print_json({"files": [str(file) for file in files]})
+        else:
+            typer.echo(f"{len(files)} files in {figures}")
+        return
+    file = results.report(against=against)
     if json:
         print_json({"report": str(file)})
     else:
         typer.echo(file)
-
-
-@app.command()
-def summary(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
-    wide: Wide = False,
-    columns: Columns = None,
-    json: Json = False,
-) -> None:
-    """Show the table and the verdict of a finished sweep again."""
-    from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
-
-    if json:
-        print_json(ResultFolder(folder).read_json(SUMMARY_JSON))
-    else:
-        show_results(folder, wide, columns)
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -47,7 +48,7 @@ class Paper:
 
 DESK = Paper()
 _PAPER: ContextVar[Paper] = ContextVar("paper", default=DESK)
-LEAST_CELL = 1.4
+LEAST_CELL = 1.1
 """Least width of a small panel [in]."""
 
 
@@ -98,16 +99,21 @@ def grid_of(count: int, across: int, cell: tuple[float, float], sharex: bool = T
     return figure, axes[:count]
 
 
-def broken(name: str, most: int = 18) -> str:
-    """A long name in two lines, parted where it has a dash or a plus near its middle."""
-    if len(name) <= most:
-        return name
-    places = [i for i, sign in enumerate(name) if sign in "-+_"] or [len(name) // 2]
-    place = min(places, key=lambda i: abs(i - len(name) // 2))
-    return f"{name[:place]}\n{name[place:]}"
+def broken(name: str, most: int = 16) -> str:
+    """A long name in several lines, parted behind its dashes and pluses."""
+    lines = [""]
+    for piece in re.split(r"(?<=[-+_])", name):
+        if lines[-1] and len(lines[-1]) + len(piece) > most:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(lines)
 
 
-def columns_for(labels: Sequence[str], figure: Figure) -> int:
-    """Columns of a legend below a figure in which the longest label fits."""
-    width = 0.0085 * mpl.rcParams["font.size"] * max(map(len, labels), default=1) + 0.5
-    return max(1, min(4, int(figure.get_figwidth() / width)))
+def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str], **options: Any) -> None:
+    """Put a legend below the axes, in as many columns as fit, and make the figure higher by it."""
+    font = mpl.rcParams["font.size"]
+    longest = max((len(line) for label in labels for line in label.split("\n")), default=1)
+    columns = max(1, min(4, int(figure.get_figwidth() / (0.0088 * font * longest + 0.055 * font))))
+    rows = sum(label.count("\n") + 1 for label in labels) / columns
+    figure.set_figheight(figure.get_figheight() + max(rows - 2, 0) * 1.3 * font / 72)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, **options)

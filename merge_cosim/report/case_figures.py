@@ -81,7 +81,7 @@ def log_odds_figure(traces: pd.DataFrame, looks: Mapping[str, Look]) -> Figure |
         axes.axhline(0.0, color="#777777", lw=0.8, ls=(0, (2, 2)))
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, -1.0), max(high, 1.0))
-        axes.set(xlabel="time [s]", ylabel="log P(not yield) − log P(yield)\n< 0: host goes first, ≥ 0: it follows")
+        axes.set(xlabel="time [s]", ylabel="log-odds of not yielding\n(< 0: the host goes first)")
         _legend(figure)
     return figure
 
@@ -112,10 +112,7 @@ def _draw(paths: list[_Path], looks: Mapping[str, Look], quantity: str, label: s
 
 
 def _legend(figure: Figure) -> None:
-    labels = [str(line.get_label()) for line in figure.axes[0].lines]
-    longest = [line for label in labels for line in label.split("\n")]
-    columns = canvas.columns_for(longest, figure)
-    figure.legend(loc="outside lower center", ncols=columns, handlelength=1.8, columnspacing=1.2)
+    canvas.legend_below(figure, *figure.axes[0].get_legend_handles_labels(), handlelength=1.8, columnspacing=1.2)
 
 
 def _paths(traces: pd.DataFrame, failed: Mapping[str, bool]) -> list[_Path]:

@@ -32,4 +32,4 @@ def write_tables(folder: Path, tables: Mapping[str, Table]) -> list[Path]:
 
 def file_stem(name: str) -> str:
     """A name as that of a file."""
-    return re.sub(r"[^\w.-]+", "-", name)
+    return re.sub(r"[^\w.+-]+", "-", name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,8 @@ import pandas as pd
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.report import collisions, page_data, tables
-from merge_cosim.report.chapters import SOURCES, chapter
+from merge_cosim.report.chapters import SOURCES, Chapter, chapter
+from merge_cosim.report.columns import Table
 from merge_cosim.report.export import write_tables
 from merge_cosim.report.html import render
 from merge_cosim.report.methods import in_order, looks
@@ -25,8 +27,45 @@ from merge_cosim.simulation.worlds.traffic import TRAFFIC
 REPORT = "report.html"
 
 
-def write_report(folder: Path, against: str | None = None) -> Path:
-    """Write `report.html` and `tables/` into a result folder; returns the page.
+@dataclass(frozen=True)
+class Report:
+    """What a report says, before it becomes a page or figures.
+
+    Attributes:
+        manifest: How the results were made.
+        results, summary, traces: The rows of the folder; the summary with what only a reader needs.
+        recorded: The recorded cases for the viewer, and `left_out`, how many more there are.
+        chapters: One for each scenario, site and source.
+        variations: A table for each varied parameter.
+        contacts, traffic: The tables of collisions and of scenes; None where there is none.
+    """
+
+    manifest: dict[str, Any]
+    results: pd.DataFrame
+    summary: pd.DataFrame
+    traces: pd.DataFrame
+    recorded: list[dict[str, Any]]
+    left_out: int
+    chapters: list[Chapter]
+    variations: dict[str, Table]
+    contacts: Table | None
+    traffic: Table | None
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """All tables by the names of their files."""
+        found = {
+            f"{c.section.scenario}-{c.section.site}-{c.section.source}-{name}": table
+            for c in self.chapters
+            for name, table in c.tables.items()
+        }
+        found |= {f"vary-{key}": table for key, table in self.variations.items()}
+        others = {"traffic": self.traffic, "collisions": self.contacts}
+        return found | {name: table for name, table in others.items() if table is not None}
+
+
+def read_report(folder: Path, against: str | None = None) -> Report:
+    """Gather what a report says about a result folder.
 
     Args:
         folder: The result folder.
@@ -42,43 +81,54 @@ def write_report(folder: Path, against: str | None = None) -> Path:
     manifest = store.read_json(MANIFEST)
     labels = [f"{name}={value}" for name, values in manifest["variations"] for value in values]
     summary = tables.summary_frame(_compared(store.read_json(SUMMARY_JSON), results, against), labels)
-    recorded, left_out = recorded_cases(store.traces().to_pandas(), results)
+    traces = store.traces().to_pandas()
+    recorded, left_out = recorded_cases(traces, results)
     said = verdicts(summary, results)
     chapters = [
         chapter(i, one, results, summary, manifest, said[one.scenario, one.site, one.source], recorded)
         for i, one in enumerate(tables.sections(summary), 1)
     ]
-    varied = tables.varied_parameters(summary)
-    variations = {f"{scenario}-{name}": tables.variation_table(summary, scenario, name) for scenario, name in varied}
+    variations = {
+        f"{scenario}-{name}": tables.variation_table(summary, scenario, name)
+        for scenario, name in tables.varied_parameters(summary)
+    }
     contacts = collisions.collision_table(results) if len(tables.simulated(results)) else None
     traffic = traffic_table(store.traffic())
-    exported = {
-        f"{c.section.scenario}-{c.section.site}-{c.section.source}-{name}": table
-        for c in chapters
-        for name, table in c.tables.items()
-    }
-    exported |= {f"vary-{key}": table for key, table in variations.items()}
-    exported |= {"traffic": traffic} if traffic else {}
-    write_tables(folder, exported | ({"collisions": contacts} if contacts else {}))
+    return Report(manifest, results, summary, traces, recorded, left_out, chapters, variations, contacts, traffic)
+
+
+def write_report(folder: Path, against: str | None = None) -> Path:
+    """Write `report.html` and `tables/` into a result folder; returns the page.
+
+    Args:
+        folder: The result folder.
+        against: Method to compare the others with; None for the one that the sweep chose.
+
+    Raises:
+        UserError: The folder holds no finished sweep, or not the method to compare with.
+    """
+    report = read_report(folder, against)
+    write_tables(folder, report.tables)
+    varied = tables.varied_parameters(report.summary)
     data = {
-        "methods": page_data.method_looks(looks(results["method"])),
-        "tests": {one.key: one.data for one in chapters},
-        "variations": [page_data.variation_data(summary, *pair) for pair in varied],
-        "cases": recorded,
+        "methods": page_data.method_looks(looks(report.results["method"])),
+        "tests": {one.key: one.data for one in report.chapters},
+        "variations": [page_data.variation_data(report.summary, *pair) for pair in varied],
+        "cases": report.recorded,
     }
     file = folder / REPORT
     page = render(
         "report.html",
         data=data,
-        chapters=chapters,
-        recorded=recorded,
-        left_out=left_out,
-        variations=list(variations.values()),
-        contacts=contacts,
-        traffic=traffic,
-        note_lines=store.note_lines(),
-        explained=collisions.explained(results),
-        provenance=_provenance(manifest, results),
+        chapters=report.chapters,
+        recorded=report.recorded,
+        left_out=report.left_out,
+        variations=list(report.variations.values()),
+        contacts=report.contacts,
+        traffic=report.traffic,
+        note_lines=ResultFolder(folder).note_lines(),
+        explained=collisions.explained(report.results),
+        provenance=_provenance(report.manifest, report.results),
         papers=(PGM_PAPER, FG_GMM_PAPER),
     )
     file.write_text(page, encoding="utf-8")

@@ -167,7 +167,7 @@ def variation_figure(summary: pd.DataFrame, parameter: str, looks: Mapping[str, 
         axes[0].set_ylim(0.0, _top(varied))
         axes[0].set_ylabel("failures [%]")
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=canvas.columns_for(labels, figure))
+        canvas.legend_below(figure, handles, labels)
     return figure
 
 
