@@ -75,7 +75,9 @@ def panel(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Any]:
     return figure, figure.add_subplot()
 
 
-def grid_of(count: int, across: int, cell: tuple[float, float], sharex: bool = True) -> tuple[Figure, list[Any]]:
+def grid_of(
+    count: int, across: int, cell: tuple[float, float], sharex: bool = True, titles: Sequence[str] = ()
+) -> tuple[Figure, list[Any]]:
     """Make small multiples that share their axes; returns the figure and `count` axes, row by row.
 
     Args:
@@ -83,6 +85,7 @@ def grid_of(count: int, across: int, cell: tuple[float, float], sharex: bool = T
         across: Most panels in a row.
         cell: Width and height of one [in].
         sharex: They share the horizontal axis, too.
+        titles: What will stand above them; long ones take several lines, for which there is room.
     """
     across = min(across, count)
     wanted = _PAPER.get().width
@@ -90,6 +93,8 @@ def grid_of(count: int, across: int, cell: tuple[float, float], sharex: bool = T
         across = min(across, max(1, int(wanted / LEAST_CELL)))
         cell = wanted / across, cell[1] * min(wanted / across / cell[0], 1.5)
     down = -(-count // across)
+    lines = max((broken(title).count("\n") for title in titles), default=0)
+    cell = cell[0], cell[1] + lines * 1.3 * mpl.rcParams["font.size"] / 72
     figure = Figure(figsize=(cell[0] * across, cell[1] * down), layout="constrained")
     axes = figure.subplots(down, across, sharex=sharex, sharey=True, squeeze=False).ravel().tolist()
     for spare in axes[count:]:

@@ -85,7 +85,7 @@ def failure_map(results: pd.DataFrame) -> Figure:
     top = max(max(float(np.nanmax(part)) for part in parts.values()), 1e-3)
     edges = _edges(shares.mergings), _edges(shares.hosts)
     with canvas.style():
-        figure, axes = canvas.grid_of(len(parts), 4, CELL if len(parts) > 1 else ALONE)
+        figure, axes = canvas.grid_of(len(parts), 4, CELL if len(parts) > 1 else ALONE, titles=list(parts))
         for ax, (method, part) in zip(axes, parts.items(), strict=True):
             image = ax.pcolormesh(*edges, 100 * part, vmin=0, vmax=100 * top, cmap="YlOrRd", linewidth=0)
             row, column = np.nonzero(shares.absent[method])
@@ -106,7 +106,7 @@ def ambiguity_figure(results: pd.DataFrame, looks: Mapping[str, Look]) -> Figure
     top = max(1.1 * float(usual["delay_s"].quantile(SHOWN)), LEAST_RANGE) if len(usual) else LEAST_RANGE
     right = max(float(results["ambiguity_s"].quantile(SHOWN)), AMBIGUITY_EDGES[-2]) * 1.1
     with canvas.style():
-        figure, axes = canvas.grid_of(len(methods), 4, CELL)
+        figure, axes = canvas.grid_of(len(methods), 4, CELL, titles=methods)
         for ax, method in zip(axes, methods, strict=True):
             rows = results[results["method"] == method]
             failed = rows["failed"].to_numpy(dtype=bool)
