@@ -25,6 +25,7 @@ class Noisy(Sensor):
 
     Attributes:
         delay: Age of what is observed [s], in whole cycles.
+        compensated: The station is moved on by the delay at the observed speed, as a host can that knows the delay.
         station_bias: Added to the station [m].
         speed_bias: Added to the speed [m/s].
         station_sigma: Standard deviation of the station's noise [m].
@@ -40,6 +41,7 @@ class Noisy(Sensor):
 
     name: ClassVar[str] = "noisy"
     delay: Annotated[float, Field(ge=0, le=10)] = 0.0
+    compensated: bool = False
     station_bias: float = 0.0
     speed_bias: float = 0.0
     station_sigma: NonNegativeFloat = 0.0
@@ -94,7 +96,8 @@ class Noisy(Sensor):
         back = np.minimum(self._age, self._lag)
         station, speed = self._ring[(self._cycle - back) % len(self._ring), :, np.arange(len(back))].T
         self._cycle += 1
-        return np.array([station - speed * ((self._lag - back) * self.setting.dt), speed])
+        forth = back if self.compensated else back - self._lag
+        return np.array([station + speed * (forth * self.setting.dt), speed])
 
     def _errors(self) -> FloatArray:
         """The noise of this cycle, shape (2, n); in the first one from the stationary distribution."""

@@ -51,6 +51,13 @@ def test_a_delayed_state_is_as_old_as_it_should_be():
     assert {s.host_station[0] for s in seen} == {-50.0}  # the host knows its own state
 
 
+def test_a_known_delay_is_made_up_for_at_the_observed_speed():
+    sensor = begun(Noisy(delay=0.2, compensated=True))
+    states = [(-50.0, 10.0), (-49.0, 10.0), (-47.8, 12.0), (-46.4, 14.0), (-44.8, 16.0)]
+    seen = [sensor.observe(scene(*state)).merging_station[0] for state in states]
+    assert seen == pytest.approx([-50.0, -49.0, -48.0, -47.0, -45.4])  # -47.8 + 0.2 * 12 at last
+
+
 def test_a_slot_that_begins_again_sees_nothing_of_the_last_encounter():
     sensor = begun(Noisy(delay=0.3), 2)
     for cycle in range(5):
