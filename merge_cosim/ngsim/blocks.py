@@ -84,6 +84,14 @@ def _text_blocks(source: Source) -> Iterator[_Block]:
             first += block.count(b"\n")
 
 
+def _is_text(block: bytes) -> bool:
+    """Whether bytes are UTF-8; of others pyarrow cannot hand over a row."""
+    try:
+        return block.isascii() or bool(block.decode())
+    except UnicodeDecodeError:
+        return False
+
+
 def _parse_text(block: bytes, first: int, source: Source, columns: list[str]) -> pa.Table:
     """Split lines and return the chosen columns as texts."""
     if source.blanks:
@@ -98,7 +106,7 @@ def _parse_text(block: bytes, first: int, source: Source, columns: list[str]) ->
         return pa.csv.read_csv(
             pa.BufferReader(block),
             pa.csv.ReadOptions(use_threads=False, column_names=source.columns, block_size=len(block) + 1),
-            pa.csv.ParseOptions(invalid_row_handler=refuse),
+            pa.csv.ParseOptions(invalid_row_handler=refuse if _is_text(block) else None),
             pa.csv.ConvertOptions(include_columns=columns, column_types=dict.fromkeys(columns, pa.string())),
         )
     except pa.ArrowInvalid as error:

@@ -79,11 +79,14 @@ def _read(source: Source, assumed: Site | None) -> Reading:
     def work(block: pa.Table, first: int) -> Piece:
         return convert(block, first, source, assumed)
 
-    for piece in map_blocks(source, needed_columns(source, assumed), work):
-        rows += piece.rows
-        elsewhere += piece.elsewhere
-        for name, table in piece.tables.items():
-            pieces[name].append(table)
+    try:
+        for piece in map_blocks(source, needed_columns(source, assumed), work):
+            rows += piece.rows
+            elsewhere += piece.elsewhere
+            for name, table in piece.tables.items():
+                pieces[name].append(table)
+    except pa.ArrowException as error:  # a column of lists, of dates, twice by the same name
+        raise UserError(f"{source}: its columns cannot be taken as trajectories: {error}") from None
     tables, repeats = {}, Repeats()
     for name in list(pieces):
         try:

@@ -46,7 +46,10 @@ def needed_columns(source: Source, assumed: Site | None) -> list[str]:
             f"{source}: no column {' and no column '.join(missing)}; the columns are {', '.join(source.columns)}"
         )
     wanted = [*_site_columns(source, assumed), *clock, layout.recording, *layout.numbers.values(), "source", "smoothed"]
-    return list(dict.fromkeys(column for name in wanted if (column := source.find(name))))
+    found = list(dict.fromkeys(column for name in wanted if (column := source.find(name))))
+    if twice := [column for column in found if source.columns.count(column) > 1]:
+        raise UserError(f"{source}: two columns are called {twice[0]}; remove one")
+    return found
 
 
 def convert(raw: pa.Table, first: int, source: Source, assumed: Site | None) -> Piece:

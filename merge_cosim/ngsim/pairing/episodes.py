@@ -90,7 +90,7 @@ def _columns(path: Path) -> dict[str, FloatArray]:
             raise UserError(f"{path}: no column {name!r}; merging episodes have {', '.join(COLUMNS)}")
         try:
             columns[name] = table[name].cast(pa.float64()).to_numpy()
-        except pa.ArrowInvalid as error:
+        except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
             raise UserError(f"{path}: column {name!r} holds something that is not a number") from error
         for row in np.flatnonzero(~np.isfinite(columns[name]))[:1]:
             raise UserError(f"{path}: column {name!r} has no value in row {row + 1}")

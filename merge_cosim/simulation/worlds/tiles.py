@@ -7,6 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
+from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import DECIMALS
 from merge_cosim.core.units import DT, TOLERANCE, FloatArray, IntArray
 from merge_cosim.ramps.ramp import Ramp, Way
@@ -14,8 +15,8 @@ from merge_cosim.simulation.worlds.base import Ended, GivenWorld
 from merge_cosim.simulation.worlds.closed_form import ClosedForm
 from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, LanePosition
 from merge_cosim.sumo.options import SumoOptions
-from merge_cosim.sumo.session import Car, Session
-from merge_cosim.sumo.start import LibsumoSession
+from merge_cosim.sumo.session import Car, Errors, Session
+from merge_cosim.sumo.start import LibsumoSession, one_line
 from merge_cosim.sumo.tiles import tile_id, tile_net
 
 COLORS = ((40, 160, 60, 255), (210, 50, 40, 255))
@@ -50,6 +51,9 @@ class TiledWorld(GivenWorld):
             extra: Further options of SUMO.
             tiled: The session's net has tiles, not the ramp's own edges, which hold one encounter at a time.
             host: Where the hosts drive; the merging cars drive on the other path.
+
+        Raises:
+            UserError: SUMO does not start, or cannot drive on a path.
         """
         super().__init__(slots)
         self.ramp = ramp
@@ -62,10 +66,16 @@ class TiledWorld(GivenWorld):
         self._paths: tuple[Way, Way] = ("main", "ramp") if host == "main" else ("ramp", "main")
         self._by_ramp = self._paths.index("ramp")
         routes = [ramp.route(path) for path in self._paths]
-        self.session.add(
+        cars = (
             Car(name, tuple(self._id(row % slots, edge) for edge in routes[row // slots]), COLORS[row // slots])
             for name, row in self._row.items()
         )
+        refusals: Errors = (*self.session.errors, RuntimeError)
+        try:
+            self.session.add(cars)
+        except refusals as error:
+            check = f"see what 'merge-cosim ramp check {ramp.net.parent}' says"
+            raise UserError(f"{ramp.net}: SUMO cannot drive the ramp's paths: {one_line(error)}; {check}") from None
         self._lanes, self._along = LaneMap(ramp), AlongPaths(ramp, slots, self._paths)
         self._merge_position = np.zeros(2 * slots)
         self._length = np.full(2 * slots, np.nan)
