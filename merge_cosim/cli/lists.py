@@ -55,6 +55,18 @@ def scenarios(json: Json = False) -> None:
 
 
 @app.command()
+def worlds(json: Json = False) -> None:
+    """List what can move the cars (--world)."""
+    from merge_cosim.simulation.worlds.base import KINDS
+
+    rows = [{"world": kind, "moved by": by, "takes": takes} for kind, (by, takes) in KINDS.items()]
+    if json:
+        print_json(rows)
+    else:
+        show_table(rows, "")
+
+
+@app.command()
 def cache(clear: Annotated[bool, typer.Option("--clear", help="Delete it.")] = False, json: Json = False) -> None:
     """Show what is kept of generated data, and where."""
     import shutil

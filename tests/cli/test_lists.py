@@ -5,6 +5,7 @@ import json
 from typing import get_args
 
 import pytest
+from command import merge_cosim
 from typer.models import OptionInfo
 from typer.testing import CliRunner
 
@@ -50,3 +51,9 @@ def test_a_folder_without_results_is_refused(tmp_path, monkeypatch, words):
     done = runner.invoke(results.app, list(words))
     assert isinstance(done.exception, UserError)
     assert "nothing/results.parquet: no results here" in str(done.exception)
+
+
+def test_worlds(tmp_path):
+    done = merge_cosim("worlds", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert [row["world"] for row in json.loads(done.stdout)] == ["sumo", "closed-form"]

@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 
 WorldKind: TypeAlias = Literal["sumo", "closed-form"]
 """What moves the cars: SUMO, or `s' = s + v dt`."""
+KINDS: dict[WorldKind, tuple[str, str]] = {
+    "sumo": ("SUMO; the default", "every scenario, windows and SUMO's output files"),
+    "closed-form": ("s' = s + v dt, thousands of encounters side by side", "scenarios of pairs, without other cars"),
+}
+"""What moves the cars in each, and what it takes."""
 
 
 @dataclass(frozen=True)
