@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self, TypeVar
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     NonNegativeFloat,
@@ -185,6 +186,11 @@ class ByArrival(Strict):
         return self
 
 
+def _id(value: object) -> object:
+    """An id of SUMO, which may be a whole number: `--set` and TOML read that as one."""
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
 class Routes(Strict):
     """Cars of an ordinary SUMO configuration, by the roles of their types.
 
@@ -204,7 +210,7 @@ class Routes(Strict):
     replications: PositiveInt = 1
     seed: NonNegativeInt = 0
     end: NonNegativeFloat = 0.0
-    host: str = ""
+    host: Annotated[str, BeforeValidator(_id)] = ""
     attention: Attention = Attention()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,7 +17,9 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.programs import run_program
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.core.xml_file import read_xml
+from merge_cosim.ramps.create.describe import describe_ramp
 from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
+from merge_cosim.ramps.picture import PICTURE
 from merge_cosim.sumo.vehicle_types import ROLE
 
 DEMAND = ("vehicle", "trip", "flow", "person", "personFlow", "container", "containerFlow")
@@ -175,12 +178,13 @@ def _options(file: Path, changed: int, named: str) -> tuple[tuple[str, str], ...
 
 
 def _require_ramp(file: Path, net: Path) -> None:
-    """Refuse a net that is not that of a ramp."""
+    """Describe a net that has no `ramp.toml` beside it, and say so; refuse one that is not that of a ramp."""
     if not (net.parent / FILE_NAME).is_file():
-        raise UserError(
-            f"{file}: no {FILE_NAME} beside its net says where the on-ramp is; write one with: "
-            f"merge-cosim ramp describe {net}"
-        )
+        try:
+            folder = describe_ramp(net)
+        except UserError as error:
+            raise UserError(f"{file}: no {FILE_NAME} beside its net says where the on-ramp is: {error}") from None
+        print(f"{file}: the on-ramp was inferred: {folder / FILE_NAME}, drawn in {PICTURE} there", file=sys.stderr)
     own = net.parent / read_ramp_file(net.parent).net
     if own.name != net.name and own.is_file():
         raise UserError(f"{file}: {net.parent / FILE_NAME} is that of {own.name}, not of the net {net.name}")

@@ -164,3 +164,17 @@ def test_teleports_and_contacts_of_others_are_told_and_counted(tmp_path: Path, r
         assert any(what in line for line in lines), (event, lines)
         assert int(float(traffic[event])) == len(lines)
         assert f"{event}: {len(lines)}, such as: " in done.stderr
+
+
+def test_a_configuration_without_a_described_net_infers_its_ramp_and_says_so(tmp_path: Path) -> None:
+    for each in ("ramp", "ramp.sumocfg", "input_additional.add.xml"):
+        source = GAMES / each
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / each)
+    words = ("sweep", "ramp.sumocfg", "--method", "acc", "--set", "encounters.end=60")
+    # A whole number is an id like any other; no car of these files has it.
+    done = merge_cosim(*words, "--set", "encounters.host=7", cwd=tmp_path)
+    assert (done.returncode, "no vehicle, flow or type of its files has this id" in done.stderr) == (2, True), (
+        done.stderr
+    )
+    assert "the on-ramp was inferred: ramp/ramp.toml, drawn in ramp.png there" in done.stderr
+    assert (tmp_path / "ramp" / "ramp.png").is_file()

@@ -167,7 +167,7 @@ def test_document_types_and_circles_in_further_files(tmp_path):
 def test_a_net_without_a_ramp_says_how_to_get_one(tmp_path):
     file = write(tmp_path)
     (tmp_path / "mine" / "ramp.toml").unlink()
-    with pytest.raises(UserError, match=r"no ramp\.toml .*merge-cosim ramp describe .*mine/mine\.net\.xml"):
+    with pytest.raises(UserError, match=r"no ramp\.toml beside its net .*mine/mine\.net\.xml"):
         Configuration.read(file)
 
 
