@@ -8,6 +8,7 @@ try:
 except ImportError as error:
     raise ImportError("merge_cosim.gym needs Gymnasium: pip install 'merge-cosim[gym]'") from error
 
+from merge_cosim.controllers.policy import save_policy
 from merge_cosim.gym.settings import Options, Reward
 
 NAME = "merge_cosim/Merge-v0"
@@ -19,4 +20,4 @@ gymnasium.register(
     vector_entry_point="merge_cosim.gym.vector:MergeVectorEnv",
 )
 
-__all__ = ["NAME", "Options", "Reward"]
+__all__ = ["NAME", "Options", "Reward", "save_policy"]

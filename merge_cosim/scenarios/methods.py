@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
 from merge_cosim.controllers.base import Controller, controllers
+from merge_cosim.controllers.policy import Policy
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import Component, Registry, parameters, validated
@@ -23,6 +24,8 @@ HUMAN = "human"
 """The logged host itself, on replay: rows made from the log, no estimator."""
 CONSTANT = ("always-go", "always-yield")
 """The methods that `oracle-best` chooses from."""
+POLICY = "policy:"
+"""What the name of a method begins with that is a file of weights."""
 REFERENCES = (*CONSTANT, "always-brake", "oracle-label", ORACLE_BEST, HUMAN)
 """What bounds the methods: constant decisions, oracles and the logged host. They do not compete."""
 
@@ -127,6 +130,8 @@ class Method:
 
 def _parts(spec: MethodSpec) -> tuple[MethodPart, MethodPart | None, str]:
     """Estimator, controller (None for the estimator's own) and the method's name, empty where it is not written."""
+    if isinstance(spec, str) and spec.startswith(POLICY):
+        return Policy.default_estimator, Policy(file=spec.removeprefix(POLICY)), spec
     if isinstance(spec, str):
         first, _, second = spec.partition("+")
         return first, second or None, spec

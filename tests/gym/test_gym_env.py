@@ -12,10 +12,11 @@ gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
-from merge_cosim.gym import NAME, Options, Reward  # noqa: E402
+from merge_cosim.gym import NAME  # noqa: E402
 from merge_cosim.gym.drawing import LANE, Drawing, body  # noqa: E402
 from merge_cosim.gym.env import MergeEnv  # noqa: E402
 from merge_cosim.gym.episodes import Episodes  # noqa: E402
+from merge_cosim.gym.settings import Options, Reward  # noqa: E402
 from merge_cosim.gym.vector import MergeVectorEnv  # noqa: E402
 
 FEW = {"encounters.count": 40}
