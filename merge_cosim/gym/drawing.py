@@ -11,6 +11,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from merge_cosim.core.units import DT, FloatArray
+from merge_cosim.ramps.ramp import Way
 
 FPS = round(1.0 / DT)
 """Frames per second in real time."""
@@ -47,7 +48,9 @@ def body(station: float, length: float, on_ramp: bool) -> FloatArray:
 class Drawing:
     """A figure whose cars are moved from frame to frame; the window goes along with the host."""
 
-    def __init__(self) -> None:
+    def __init__(self, host: Way) -> None:
+        """Draw the roads; `host` is the path that the host comes by."""
+        self._on_ramp = (host == "ramp", host == "main")
         figure = Figure(figsize=SIZE, dpi=DOTS)
         self._canvas = FigureCanvasAgg(figure)
         self._axes = axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", xticks=[], yticks=[])
@@ -77,7 +80,7 @@ class Drawing:
         self._texts[0].set_text(f"{time:4.1f} s")
         for car, name in enumerate(("host", "merging car")):
             station, speed, length = (float(value) for value in state[car::2])
-            self._cars[car].set_xy(body(station, length, on_ramp=car == 1))
+            self._cars[car].set_xy(body(station, length, self._on_ramp[car]))
             self._texts[car + 1].set_text(f"{name:11s} {station:7.1f} m {speed:5.1f} m/s")
         self._canvas.draw()  # type: ignore[no-untyped-call]
         return np.array(self._canvas.buffer_rgba())[:, :, :3].copy()  # type: ignore[no-untyped-call]

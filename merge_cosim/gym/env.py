@@ -95,7 +95,7 @@ class MergeEnv(gymnasium.Env[Observed, Any]):
         if self.render_mode is None:
             return None
         if self._drawing is None:
-            self._drawing = Drawing()
+            self._drawing = Drawing(self.episodes.host)
         return self._drawing.frame(self.episodes.state[:, 0], float(self.episodes.time[0]))
 
     def close(self) -> None:

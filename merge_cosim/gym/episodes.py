@@ -23,6 +23,7 @@ from merge_cosim.simulation.loop import Effort, Loop, Run
 from merge_cosim.simulation.worlds.base import Ended, GivenWorld
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 from merge_cosim.simulation.worlds.tiles import TiledWorld
+from merge_cosim.sweeps.cases import PairCases
 
 
 class Driven(HostDriver):
@@ -72,6 +73,7 @@ class Episodes(Loop):
 
     Attributes:
         task: Scenario, encounters and setting.
+        host: The path that the host comes by.
         over: What the last step ended; None if nothing.
     """
 
@@ -89,11 +91,16 @@ class Episodes(Loop):
         self.task = task = options.task()
         self._names, self._measures, self._endless = tuple(options.observation), measures, endless
         self._hosts, self._reward = Driven(options.action), options.weights
+        cases = task.cases
+        assert isinstance(cases, PairCases)
+        self.host = cases.host
         self._pairs: GivenWorld = (
-            ClosedFormWorld(slots) if task.cases.world == "closed-form" else TiledWorld(task.ramp, slots, task.seed)
+            ClosedFormWorld(slots)
+            if cases.world == "closed-form"
+            else TiledWorld(task.ramp, slots, task.seed, host=cases.host)
         )
         car, rules = task.scenario.merging_car(), task.scenario.test
-        super().__init__(self._pairs, task.cases.encounters, self._hosts, car, rules, task.setting, seed=task.seed)
+        super().__init__(self._pairs, cases.pairs, self._hosts, car, rules, task.setting, seed=task.seed)
 
     def find(self, cases: Sequence[str] | Sequence[int] | AnyArray) -> IntArray:
         """Numbers of encounters that are given by name or number.

@@ -112,4 +112,8 @@ class Options:
         task = plan(request)[0]
         if not isinstance(task.cases, PairCases) or isinstance(task.cases, LoggedCases):
             raise UserError(f"scenario {task.scenario.name}: an environment has one host and one merging car")
+        if task.scenario.sensing:
+            raise UserError(
+                f"scenario {task.scenario.name}: an environment is observed without a sensor; leave out sensing"
+            )
         return replace(task, method=replace(task.method, name=AGENT))

@@ -174,6 +174,7 @@ def test_observations_are_the_features():
         ({"observation": []}, "no feature is named"),
         ({"action": "steer"}, "choose 'acceleration' or 'decision'"),
         ({"reward": {"speed": 1.0}}, "the weights are overlap, progress and comfort, not speed"),
+        ({"settings": {"sensing.model": "radar"}}, "without a sensor; leave out sensing"),
         ({"scenario": "traffic-dense", "world": "sumo"}, "one host and one merging car"),
     ],
 )
@@ -196,9 +197,11 @@ def test_wrong_cases_and_actions_are_refused():
 def test_cars_are_drawn_where_they_are():
     assert body(10.0, 5.0, on_ramp=False).tolist() == [[10, -0.95], [10, 0.95], [5, 0.95], [5, -0.95]]
     assert body(-60.0, 5.0, on_ramp=True)[:, 1].max() < -LANE
-    frame = Drawing().frame(np.array([-50.0, -60.0, 15.0, 14.0, 5.0, 5.0]), 1.2)
+    frame = Drawing("main").frame(np.array([-50.0, -60.0, 15.0, 14.0, 5.0, 5.0]), 1.2)
     assert frame.shape == (220, 800, 3)
     green, red = (np.argwhere((frame == color).all(axis=2)) for color in ((40, 160, 60), (210, 50, 40)))
     assert green[:, 0].min() < red[:, 0].min()  # the main road is above the ramp
+    turned = Drawing("ramp").frame(np.array([-60.0, -50.0, 14.0, 15.0, 5.0, 5.0]), 1.2)
+    assert np.argwhere((turned == (40, 160, 60)).all(axis=2))[:, 0].min() == red[:, 0].min()
     column = green[green[:, 1] < 510, 1].mean()
     assert abs(column / 800 * 160 - (100.0 - 2.5)) / 160 < 0.02
