@@ -2,7 +2,7 @@
 
     python tools/sensitivity_page.py [--data DIR]
 
-runs one `merge-cosim sweep` with a `--vary` per choice (about a quarter of an hour on two cores), and sets its summary
+runs one `merge-cosim sweep` with a `--vary` per choice, in closed form where a method allows it, and sets its summary
 out as tables, each row one value, each column one method, with what they show put into words by rule.
 """
 
@@ -23,8 +23,8 @@ from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.scenarios.settings import parse_value
 
-METHODS = ("acc", "slot", "slot-time", "pgm", "always-go", "always-yield")
-RIVALS = ("acc", "slot", "slot-time", "pgm")
+METHODS = ("acc", "slot", "slot-time", "pgm", "pgm-symmetric", "always-go", "always-yield")
+RIVALS = ("acc", "slot", "slot-time", "pgm", "pgm-symmetric")
 """The methods whose order matters; the others are bounds."""
 CHOICES = {
     "merging.ahead=clear,in-lane,any": "When the designed merging car takes the host to be ahead of it",
@@ -74,6 +74,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     words = ["merge-cosim", "sweep", "designed-2", *(() if arguments.short else ("us101-replay",))]
     words += [word for method in METHODS for word in ("--method", method)]
     words += [word for choice in choices for word in ("--vary", choice)]
+    words += ["--world", "closed-form"]
     if arguments.short:
         words += ["--jobs", "1", *(word for step in COARSE for word in ("--set", f"encounters.{step}"))]
     folder = arguments.folder
@@ -144,8 +145,9 @@ def findings(rows: pd.DataFrame) -> str:
         varied = rates.drop(index="")
         turned = [variation for variation, row in varied.iterrows() if reversed_pairs(default, row)]
         lines.append(f"- The order of two methods is reversed by {grouped(turned) or 'no value at all'}.")
-        best = [variation for variation, row in varied.iterrows() if row["pgm"] < row.drop("pgm").min()]
-        lines.append(f"- `pgm` fails least of all, as in the papers, with {grouped(best) or 'no value at all'}.")
+        for method in ("pgm", "pgm-symmetric"):
+            best = [variation for variation, row in varied.iterrows() if row[method] < row.drop(method).min()]
+            lines.append(f"- `{method}` fails least of all with {grouped(best) or 'no value at all'}.")
         name = varied.index.str.partition("=").get_level_values(0)
         span = (varied.groupby(name).max() - varied.groupby(name).min()).max(axis=1).sort_values(ascending=False)
         strong = ", ".join(f"`{choice}` {points:.1f}" for choice, points in span.head(3).items())
@@ -173,8 +175,9 @@ def grouped(variations: list[str]) -> str:
 
 def cell(row: pd.Series) -> str:
     """Failure rate, and the share of hosts that never arrived."""
-    missed = row["host_not_reached"] / (row["n"] + row["censored"])
-    return f"{row['failure_pct']:.1f}" + (f" ({100 * missed:.1f})" if missed else "")
+    missed = 100 * row["host_not_reached"] / (row["n"] + row["censored"])
+    shown = f"{missed:.1f}" if missed >= 0.05 else "<0.1"
+    return f"{row['failure_pct']:.1f}" + (f" ({shown})" if missed else "")
 
 
 if __name__ == "__main__":

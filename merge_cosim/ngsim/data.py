@@ -19,7 +19,7 @@ from merge_cosim.ngsim.read import Reading, merge, read_file
 from merge_cosim.ngsim.sites import Site, shipped_sites, site
 from merge_cosim.ngsim.table import Repeats
 
-READER_VERSION = 1
+READER_VERSION = 2
 """Raised when the same file would be read differently, so that cached tables are made anew."""
 
 FACTS = "reading.json"
