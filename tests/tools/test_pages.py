@@ -6,6 +6,7 @@ from pathlib import Path
 import geometry_page
 import method_pages
 import models_page
+import ranking_page
 import robustness_page
 import scenes_page
 import sensitivity_page
@@ -35,6 +36,13 @@ def test_sensitivity(tmp_path):
     text = made_like(tmp_path, "sensitivity.md")
     assert "**designed-2** (n = 48)" in text
     assert "| **clear** |" in text
+
+
+def test_ranking(tmp_path):
+    ranking_page.main(["--short", "--docs", str(tmp_path)])
+    text = made_like(tmp_path, "ranking.md")
+    assert "4 settings were tried" in text
+    assert "| slot-time |" in text
 
 
 def test_robustness(tmp_path):
