@@ -38,7 +38,8 @@ TEXT = """\
 Made by `python tools/ranking_page.py`: Designed Test II in closed form, host's offset in steps of {step} m (n = {n} per
 setting and method), model `us101-ngsim-all`. {settings} settings were tried, and all of them are shown: speed limit
 {limits} m/s x length of both cars {lengths} m x meaning of 'the host is ahead' for the designed
-merging car ({ahead}). The papers state none of the three. No default of the project was chosen from this page.
+merging car ({ahead}). The papers state none of the three. No default of the project was chosen
+from this page.
 
 ## Failures over the open choices
 
@@ -46,8 +47,8 @@ merging car ({ahead}). The papers state none of the three. No default of the pro
 
 Failures in per cent; bold: the default. A row of maps per meaning of 'ahead', a column per method, all of one scale.
 
-Kendall's tau compares the order of the {competitors} methods whose rates were published with the published order (1: the
-same, -1: reversed).
+Kendall's tau compares the order of the {competitors} methods whose rates were published with the published order (1:
+the same, -1: reversed).
 
 {orders}
 ## Estimators and controllers apart
@@ -125,7 +126,7 @@ def conclusion(rows: pd.DataFrame, orders: pd.DataFrame, published: dict[str, fl
     nearest = (by_setting[list(RULES)] - rules).abs().sum(axis=1).idxmin()
     theirs = ", ".join(f"{who} {by_setting.loc[nearest, who]:.1f} % ({rate:g} %)" for who, rate in published.items())
     return textwrap.fill(
-        f"**The rates in Designed Test II depend on choices that the papers do not state more than on the method.** The "
+        "**The rates in Designed Test II depend on choices that the papers do not state more than on the method.** The "
         f"published order appears in {same} of {len(orders)} settings; Kendall's tau with it goes from "
         f"{orders['tau'].min():.2f} to {orders['tau'].max():.2f}. The methods that learn nothing ({', '.join(RULES)}) "
         f"come nearest to their published rates with a limit of {nearest[1]:g} m/s, cars of {nearest[2]:g} m and ahead "
