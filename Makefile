@@ -1,13 +1,13 @@
 # make demo: the main job. make test: the tests. Both make the virtual environment first, with nothing but python3.
 PYTHON ?= python3
 VENV := .venv
-DEMO := acc slot pgm always-go always-yield always-brake oracle-best
+DEMO := acc,slot,ipcb,pgm-g,pgm,pgm-symmetric,fg,fg-gmm,dbn-pf,interactive,always-go,always-yield,oracle-best
 BIN := $(VENV)/bin
 
 .PHONY: demo test coverage lint docs clean
 
 demo: $(VENV)/installed
-	$(BIN)/merge-cosim sweep designed-2 $(DEMO:%=--method %) --out out/demo --overwrite
+	$(BIN)/merge-cosim sweep designed-2 --method $(DEMO) --world closed-form --verify 0.005 --out out/demo --overwrite
 	$(BIN)/merge-cosim report out/demo
 
 test: $(VENV)/installed
