@@ -18,6 +18,8 @@ from merge_cosim.core.registry import did_you_mean
 from merge_cosim.ngsim.data import find_data
 from merge_cosim.report.comparison import compare
 from merge_cosim.report.page import write_report
+from merge_cosim.report.run_command import run_command
+from merge_cosim.results.statistics.summary import CASE
 from merge_cosim.results.store import ENSEMBLE_CSV, MANIFEST, RIVALS_CSV, SUMMARY_JSON, ResultFolder
 
 if TYPE_CHECKING:
@@ -103,21 +105,40 @@ class Results:
         """What was noted in living traffic, a line for each kind of event."""
         return self._store.note_lines()
 
-    def cases(self, where: str | None = None) -> pd.DataFrame:
+    def cases(self, where: str | None = None, fails: Sequence[str] = (), passes: Sequence[str] = ()) -> pd.DataFrame:
         """The rows for which a condition holds.
 
         Example:
             >>> results.cases("failed and method == 'pgm'")  # doctest: +SKIP
+            >>> results.cases(fails=["pgm"], passes=["acc"])  # doctest: +SKIP
 
         Args:
             where: A condition on the columns, as `pandas.DataFrame.query` takes it; all rows, if not given.
+            fails: Methods under which the case fails; rows of theirs are given, if there are any.
+            passes: Methods under which it neither fails nor is stuck or censored.
 
         Returns:
             Those rows, numbered anew.
 
         Raises:
-            UserError: The condition cannot be read, or names a column that there is not.
+            UserError: The condition cannot be read, names a column that there is not, or a method was not run.
         """
+        rows = self._where(where)
+        for name in (*fails, *passes):
+            if name not in self.methods:
+                raise UserError(f"{self.path}: no method '{name}' in these results{did_you_mean(name, self.methods)}")
+        bad = self.rows["failed"] | self.rows["stuck"] | self.rows["censored"]
+        for holds, names in ((self.rows["failed"], fails), (~bad, passes)):
+            for name in names:
+                chosen = self.rows[holds & (self.rows["method"] == name)]
+                rows = rows.merge(chosen[CASE].drop_duplicates(), on=CASE)
+        return rows[rows["method"].isin(fails or passes)].reset_index(drop=True) if fails or passes else rows
+
+    def run_commands(self, rows: pd.DataFrame) -> list[str]:
+        """The commands that run the cases of some rows again, one for each."""
+        return [run_command(row, self.manifest) for row in rows.to_dict("records")]
+
+    def _where(self, where: str | None) -> pd.DataFrame:
         if where is None:
             return self.rows.copy()
         try:

@@ -1,4 +1,4 @@
-"""`merge-cosim report`, `summary`, `compare`, `verify`, `reproduce`, `bounds` and `bench`: what is made of results."""
+"""`merge-cosim report`, `summary`, `compare`, `cases`, `verify`, `reproduce`, `bounds`, `bench`: from results."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,7 +17,8 @@ from merge_cosim.cli.options import (
     Sets,
     World,
 )
-from merge_cosim.cli.show import print_json, show_table, show_verification, verification
+from merge_cosim.cli.show import print_json, show_results, show_short_table, show_table, show_verification, verification
+from merge_cosim.core.errors import UserError
 
 app = typer.Typer()
 
@@ -58,25 +59,70 @@ def report(
 
 @app.command()
 def compare(
-    first: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep: A.")],
-    second: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of another sweep: B.")],
+    first: Annotated[str, typer.Argument(metavar="A", help="Result folder, or DIR:METHOD (DIR:METHOD@MODEL).")],
+    second: Annotated[str, typer.Argument(metavar="B", help="Another, or another method of the same or another.")],
     out: Annotated[Path | None, typer.Option(help="Folder for the table as CSV and LaTeX.")] = None,
+    wide: Wide = False,
     json: Json = False,
 ) -> None:
-    """Set two sweeps side by side, on the cases that both hold."""
+    """Set two sweeps, or two methods of any folders, side by side, on the cases that both hold."""
     from merge_cosim.report.comparison import compare as compare_folders
     from merge_cosim.report.export import write_tables
+    from merge_cosim.report.short_table import compared_tables
 
-    table, differences = compare_folders(first, second)
+    (path_a, method_a), (path_b, method_b) = map(_side, (first, second))
+    if bool(method_a) != bool(method_b):
+        raise UserError(f"compare {first} {second}: name a method of both (DIR:METHOD DIR:METHOD), or of neither")
+    methods = (method_a, method_b) if method_a and method_b else None
+    table, differences = compare_folders(path_a, path_b, methods)
     files = [] if out is None else write_tables(out, {"comparison": table})
     if json:
         rows = table.data.astype(object).where(table.data.notna(), None).to_dict("records")
         print_json({"rows": rows, "differences": differences, "files": [str(file) for file in files]})
         return
-    headings = [" ".join(filter(None, (column.group, column.heading))) for column in table.columns]
-    show_table([dict(zip(headings, row, strict=True)) for row in table.cells], table.title)
+    if wide:
+        headings = [" ".join(filter(None, (column.group, column.heading))) for column in table.columns]
+        show_table([dict(zip(headings, row, strict=True)) for row in table.cells], table.title)
+    else:
+        typer.echo(table.title)
+        for part in compared_tables(table):
+            show_short_table(part)
     for line in differences:
         typer.echo(line)
+
+
+def _side(text: str) -> tuple[Path, str | None]:
+    """A folder, and the method named behind it."""
+    folder, colon, method = text.rpartition(":")
+    return (Path(folder), method) if colon and not Path(text).is_dir() else (Path(text), None)
+
+
+@app.command()
+def cases(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
+    where: Annotated[str | None, typer.Option(help="Condition on columns of results.parquet.")] = None,
+    fails: Annotated[list[str] | None, typer.Option(help="Method under which the case fails; several: all.")] = None,
+    passes: Annotated[
+        list[str] | None, typer.Option("--not", help="Method under which it is carried to the end without failure.")
+    ] = None,
+    limit: Annotated[int, typer.Option(min=0, help="Most cases to list; 0, or --json: all.")] = 20,
+    json: Json = False,
+) -> None:
+    """List cases, each as the command that runs it: --where "failed and method == 'pgm'", or --fails pgm --not acc."""
+    from merge_cosim.api.results import load_results
+
+    results = load_results(folder)
+    rows = results.cases(where, fails or (), passes or ())
+    shown = rows.head(limit) if limit and not json else rows
+    commands = results.run_commands(shown)
+    if json:
+        listed = shown.astype(object).where(shown.notna(), None).to_dict("records")
+        print_json([row | {"command": command} for row, command in zip(listed, commands, strict=True)])
+        return
+    for command in commands:
+        typer.echo(command)
+    more = f"; {len(rows) - len(shown):,} are not shown (--limit 0)" if len(shown) < len(rows) else ""
+    typer.echo(f"{len(rows):,} of {len(results):,} rows{more}", err=True)
 
 
 @app.command()

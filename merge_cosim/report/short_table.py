@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,9 +13,10 @@ import pandas as pd
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.core.units import FloatArray, IntArray
-from merge_cosim.report.columns import Column
+from merge_cosim.report.columns import Column, Table
+from merge_cosim.report.comparison import MEASURES, SIDES
 from merge_cosim.report.traffic_table import traffic_table
-from merge_cosim.results.statistics.summary import is_sample
+from merge_cosim.results.statistics.summary import SECTION, is_sample
 from merge_cosim.results.statistics.verdict import verdicts
 from merge_cosim.results.store import MANIFEST, SUMMARY_JSON, ResultFolder
 from merge_cosim.scenarios.methods import is_reference
@@ -53,7 +55,16 @@ TRAFFIC = (
 IN_TITLE = {"n": "cases each: {}", "scenes": "scenes each: {}", "stuck": "stuck: {}", "variation": "{}"}
 """How the title says what is the same in all rows."""
 LESS_IS_BETTER = ("failure_pct", "stuck", "failed_or_stuck_pct", "delay_s")
-ROWS = ["scenario", "variation", "site", "source", "case", "car", "method", "model", "failed", "stuck", "censored"]
+COMPARED = (
+    *("variation", "method", "n", "failure_pct_a", "failure_pct_b", "only_a", "only_b", "p"),
+    *("distance_m_difference", "delay_s_difference"),
+)
+"""What is shown where many methods of two folders are compared."""
+LINES = {"failure_pct": "failed %"} | MEASURES
+"""The lines of a comparison of two methods."""
+ROWS = [
+    *("scenario", "variation", "site", "source", "case", "car", "method", "model", "failed", "stuck", "censored"),
+]
 """Columns of the rows that a verdict needs."""
 NAMES = ("scenario", "site", "source")
 
@@ -130,6 +141,32 @@ def traffic_tables(path: Path, wide: bool = False) -> list[ShortTable]:
     shown = [column for column in whole.columns if column.name != "scenario" and (wide or column.name in TRAFFIC)]
     parts = [(str(scenario), part) for scenario, part in data.groupby("scenario", sort=False)]
     return [_table(scenario, ["the traffic as a whole"], part, shown) for scenario, part in parts]
+
+
+def compared_tables(table: Table) -> list[ShortTable]:
+    """What `comparison.compare` found, in 80 columns: one table per row where two methods were compared."""
+    if "method" in table.data:
+        shown = [column for column in table.columns if column.name in COMPARED]
+        return [
+            _table(str(scenario), [], part.assign(variation=part.get("variation"), reference=False), shown)
+            for scenario, part in table.data.groupby("scenario", sort=False)
+        ]
+    return [_beside(row, [column for column in table.columns if column.group]) for row in table.data.to_dict("records")]
+
+
+def _beside(row: Mapping[Hashable, Any], columns: Sequence[Column]) -> ShortTable:
+    """One comparison of two methods: a line per measure."""
+    names = [str(row[name]) for name in SECTION if row.get(name)]
+    sides = (Column("measure", ""), *(Column(side, heading, range=True) for side, heading, _ in SIDES))
+    text = {column.name: column.text(row[column.name]) for column in columns}
+    cells = [[heading, *(text.get(f"{name}_{side}", "") for side, *_ in SIDES)] for name, heading in LINES.items()]
+    cells.insert(1, ["failed under this one only", text["only_a"], text["only_b"], "", ""])
+    said = (
+        f"Failures of the same cases (exact test, a car's cases kept together): p = {text['p']}.".replace("= <", "< ")
+        if "p" in text
+        else ""
+    )
+    return ShortTable(f"{', '.join(names)}: {text['n']} common cases", sides, cells, len(cells), frozenset(), said)
 
 
 def _several_models(summary: pd.DataFrame) -> pd.Series:

@@ -146,6 +146,8 @@ def sweep(
             "dask": request.dask,
             "resumed": resume,
             "added": add,
+            "scenarios": sorted({*before.get("command", {}).get("scenarios", []), *_files(request)}),
+            "data": str(request.data) if request.data else None,
         },
         "wall_s": round(perf_counter() - begin, 3),
         "plan_s": round(planned - begin, 3),
@@ -163,6 +165,11 @@ def sweep(
     folder.write_json(MANIFEST, manifest)
     folder.finish()
     return manifest
+
+
+def _files(request: SweepRequest) -> list[str]:
+    """Names and files of the scenarios, where they came from such."""
+    return [spec for spec in request.scenarios if isinstance(spec, str)]
 
 
 def _run(request: SweepRequest, chunks: Sequence[Chunk], folder: ResultFolder, progress: Progress | None) -> _Tally:

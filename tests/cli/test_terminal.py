@@ -1,11 +1,13 @@
 """What a sweep and a case look like in a terminal of 80 columns."""
 
 import json
+import shlex
 from itertools import pairwise
 
 import pytest
 from command import merge_cosim, refused, small_scenario
 
+import merge_cosim as mc
 from merge_cosim.scenarios.methods import is_reference
 
 WIDTH = 80
@@ -73,6 +75,75 @@ def test_a_varied_parameter_heads_the_column_of_its_values(tmp_path):
     (rows,) = rows_of(printed)
     assert [row[0] for row in rows] == ["–", "10", "2"]  # as the user gave them
     assert "Without variation: acc" in printed
+
+
+@pytest.fixture(scope="module")
+def sampled(tmp_path_factory):
+    """Two sweeps of random cases, the second with more of them and another method; and what the first printed."""
+    folder = tmp_path_factory.mktemp("sampled")
+    closed = ("sweep", "designed-random", "--world", "closed-form")
+    done = merge_cosim(
+        *(*closed, "--method", "acc,pgm", "--set", "acc.headway=1.2", "--set", "encounters.count=200", "--out", "a"),
+        cwd=folder,
+    )
+    assert done.returncode == 0, done.stderr
+    more = merge_cosim(*closed, "--method", "fg", "--set", "encounters.count=250", "--out", "b", cwd=folder)
+    assert more.returncode == 0, more.stderr
+    return folder, done.stdout
+
+
+def test_a_sample_has_intervals_and_a_verdict_with_its_certainty(sampled):
+    _, printed = sampled
+    assert "95 % CI" in printed
+    assert "Holm" in printed
+    assert max(map(len, printed.splitlines())) <= WIDTH
+
+
+def test_any_two_methods_are_compared_on_their_common_cases(sampled):
+    folder, _ = sampled
+    printed = merge_cosim("compare", "a:pgm", "b:fg", cwd=folder).stdout
+    assert printed.startswith("A: a, pgm; B: b, fg\ndesigned-random: 200 common cases\n")
+    assert "p = " in printed or "p < " in printed
+    assert "0.000" not in printed
+    assert max(map(len, printed.splitlines())) <= WIDTH
+    (row,) = json.loads(merge_cosim("compare", "a:pgm", "b:fg", "--json", cwd=folder).stdout)["rows"]
+    a, b = (mc.load_results(folder / name).rows.set_index(["method", "case"])["delay_s"] for name in "ab")
+    differences = (a["pgm"] - b["fg"]).dropna()
+    assert (row["n"], row["delay_s_difference"]) == (200, pytest.approx(differences.mean()))
+    assert row["delay_s_interval"]
+    assert "name a method of both" in refused("compare", "a:pgm", "b", cwd=folder)
+    assert "did you mean 'pgm'" in refused("compare", "a:pgn", "b:fg", cwd=folder)
+    assert "DIR:METHOD DIR:METHOD compares two methods" in refused("compare", "a", "b", cwd=folder)
+
+
+def test_a_listed_case_can_be_pasted_into_a_shell(sampled):
+    folder, _ = sampled
+    listed = merge_cosim("cases", "a", "--where", "failed and method == 'pgm'", "--limit", "2", cwd=folder)
+    rows = mc.load_results(folder / "a").rows
+    failed = rows[rows["failed"] & (rows["method"] == "pgm")]
+    lines = listed.stdout.splitlines()
+    assert len(lines) == min(2, len(failed)) > 0
+    assert listed.stderr.startswith(f"{len(failed):,} of 400 rows")
+    program, *words = shlex.split(lines[0])
+    assert program == "merge-cosim"
+    again = json.loads(merge_cosim(*words, "--json", cwd=folder).stdout)
+    first = failed.iloc[0]
+    assert (again["case"], again["method"], again["failed"]) == (first["case"], "pgm", True)
+    assert again["delay_s"] == pytest.approx(first["delay_s"])
+
+
+def test_cases_that_fail_under_one_method_and_not_under_another(sampled):
+    folder, _ = sampled
+    found = json.loads(merge_cosim("cases", "a", "--fails", "pgm", "--not", "acc", "--json", cwd=folder).stdout)
+    rows = mc.load_results(folder / "a").rows
+    by = {name: part.set_index("case") for name, part in rows.groupby("method")}
+    bad = by["acc"][["failed", "stuck", "censored"]].any(axis=1)
+    expected = by["pgm"].index[by["pgm"]["failed"] & ~bad[by["pgm"].index]]
+    assert sorted(row["case"] for row in found) == sorted(expected)
+    assert {row["method"] for row in found} == {"pgm"}
+    assert len(found) > 0
+    assert "no method 'pgn'" in refused("cases", "a", "--fails", "pgn", cwd=folder)
+    assert "no column 'faild'" in refused("cases", "a", "--where", "faild", cwd=folder)
 
 
 def test_a_finished_sweep_is_never_replaced_unasked(swept):
