@@ -11,11 +11,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
+from merge_cosim.sweeps.forecast import duration
+
 LINE_EVERY_S = 10.0
-"""Time between two plain lines [s]; a shorter sweep prints none."""
+"""Time between two plain lines [s]; a sweep that takes less prints none."""
 
 Progress = Callable[[int, int, str], None]
-"""Takes the cases done, the cases in all, and what is being run."""
+"""Takes the cases done, the cases in all, and what is being run; with none done, what there is to run."""
 
 
 @contextmanager
@@ -28,20 +30,29 @@ def sweep_progress(shown: bool = True) -> Iterator[Progress]:
         columns = (TextColumn("{task.description:32}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with Bar(*columns, console=console, transient=True, auto_refresh=False) as bar:  # no thread
             task = bar.add_task("preparing", total=None)
-            yield lambda done, total, what: bar.update(
-                task, completed=done, total=total, description=what, refresh=True
-            )
+
+            def show(done: int, total: int, what: str) -> None:
+                if not done:
+                    bar.console.print(what, highlight=False)
+                bar.update(task, completed=done, total=total, description=what if done else "running", refresh=True)
+
+            yield show
     else:
         yield _Lines()
 
 
 class _Lines:
-    """Prints a line every `LINE_EVERY_S`."""
+    """Prints what there is to run, and then a line every `LINE_EVERY_S`."""
 
     def __init__(self) -> None:
-        self._last = monotonic()
+        self._begin = self._last = monotonic()
 
     def __call__(self, done: int, total: int, what: str) -> None:
-        if monotonic() - self._last >= LINE_EVERY_S:
-            self._last = monotonic()
-            print(f"{done:,} of {total:,} cases, {what}", file=sys.stderr, flush=True)
+        now = monotonic()
+        if not done:
+            print(what, file=sys.stderr, flush=True)
+            self._begin = self._last = now
+        elif now - self._last >= LINE_EVERY_S:
+            self._last = now
+            left = (now - self._begin) * (total - done) / done
+            print(f"{done:,} of {total:,}, about {duration(left)} left: {what}", file=sys.stderr, flush=True)

@@ -32,6 +32,7 @@ from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.adding import joined, missing
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
 from merge_cosim.sweeps.executors import executor_for
+from merge_cosim.sweeps.forecast import forecast, seconds
 from merge_cosim.sweeps.identity import identity
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.single_timing import time_single_cases
@@ -40,7 +41,9 @@ from merge_cosim.sweeps.task import Task
 __all__ = ["SweepRequest", "plan", "sweep"]
 
 Progress = Callable[[int, int, str], None]
-"""Told the cases done, the cases in all and what is being run."""
+"""Told the cases done, the cases in all and what is being run; before the first case, what there is to run."""
+TELL_S = 10.0
+"""What there is to run is told where it takes about this long [s] or longer."""
 
 
 @dataclass
@@ -131,6 +134,8 @@ def sweep(
     else:
         folder.begin(what, resume, overwrite)
     planned = perf_counter()
+    if progress and seconds(tasks, request.jobs) >= TELL_S:
+        progress(0, sum(map(len, tasks)), forecast(tasks, request.jobs))
     tally = _run(request, list(cut(tasks)), folder, progress)
     ran = perf_counter()
     folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
