@@ -7,6 +7,7 @@ import typer
 
 from merge_cosim.cli.options import (
     Against,
+    Columns,
     Data,
     ForceSource,
     Jobs,
@@ -15,6 +16,7 @@ from merge_cosim.cli.options import (
     Plugins,
     Seed,
     Sets,
+    Wide,
     World,
 )
 from merge_cosim.cli.show import print_json, show_results, show_short_table, show_table, show_verification, verification
@@ -55,6 +57,22 @@ def report(
         print_json({"report": str(file)})
     else:
         typer.echo(file)
+
+
+@app.command()
+def summary(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
+    wide: Wide = False,
+    columns: Columns = None,
+    json: Json = False,
+) -> None:
+    """Show the table and the verdict of a finished sweep again."""
+    from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
+
+    if json:
+        print_json(ResultFolder(folder).read_json(SUMMARY_JSON))
+    else:
+        show_results(folder, wide, columns)
 
 
 @app.command()
