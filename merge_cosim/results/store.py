@@ -295,7 +295,8 @@ class ResultFolder:
             UserError: They are missing or damaged.
         """
         records = _read_table(self.path / TRACES)
-        _require(self.path / TRACES, records.schema, _TRACE)
+        if len(records):  # of living traffic alone there are none
+            _require(self.path / TRACES, records.schema, _TRACE)
         return records
 
     def write_json(self, name: str, document: Any) -> None:
