@@ -10,6 +10,7 @@ import argparse
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import sys
@@ -23,6 +24,9 @@ from fuzz_inputs import TARGETS, Target
 
 LIMIT = 60.0
 """Longest time for one input [s]."""
+
+MEMORY = 8 << 30
+"""Most memory for one input [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,7 @@ def run(words: tuple[str, ...], folder: Path, limit: float = LIMIT) -> Outcome:
 def _child(words: tuple[str, ...], folder: Path, said: Path) -> None:
     """Never returns."""
     os.setsid()
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     os.chdir(folder)
     for name, descriptor in (("stdout.txt", 1), (said.name, 2)):
         os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), descriptor)

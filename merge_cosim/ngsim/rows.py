@@ -12,7 +12,7 @@ from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.ngsim.clean import OPTIONAL, Place, checked, numbers
 from merge_cosim.ngsim.formats import OWN, Source, missing_columns
 from merge_cosim.ngsim.sites import Site, shipped_sites
-from merge_cosim.ngsim.table import SCHEMA
+from merge_cosim.ngsim.table import LATEST_MS, SCHEMA
 
 CLOCK = "Global_Time"
 """The column [ms since 1970] that tells the recordings apart where the file does not name them."""
@@ -145,7 +145,8 @@ def _recording(raw: pa.Table, frame: FloatArray, place: Place) -> pa.Array:
         return pa.array([place.source.path.stem] * raw.num_rows).dictionary_encode()
     column = place.source.find(CLOCK)
     assert column is not None
-    return pa.array((numbers(raw[column], column, place) - FRAME_MS * frame).astype(np.int64))
+    origin = numbers(raw[column], column, place) - FRAME_MS * frame
+    return pa.array(np.clip(origin, -1.0, LATEST_MS + 1.0).astype(np.int64))  # what is no time stays none
 
 
 def _texts(raw: pa.Table, column: str) -> pa.DictionaryArray:

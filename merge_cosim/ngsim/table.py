@@ -40,6 +40,9 @@ SCHEMA = pa.schema(
 CLOCK_SPREAD_MS = 60_000
 """Clock origins closer than this [ms] belong to one recording."""
 
+LATEST_MS = 4_102_444_800_000
+"""Clock origins after this (the year 2100) are none [ms since 1970]."""
+
 CONFLICT_M = 0.01
 """Rows of one car and frame whose positions differ by more than this [m] contradict each other."""
 
@@ -73,13 +76,13 @@ def name_recordings(origins: IntArray) -> pa.DictionaryArray:
         origins: `Global_Time - 100 ms * Frame_ID` [ms since 1970], constant within an original file. Shape (n,).
 
     Raises:
-        ClockError: Origins drift through more than `CLOCK_SPREAD_MS`, so no recording can be told.
+        ClockError: Origins drift through more than `CLOCK_SPREAD_MS`, so no recording can be told, or are no times.
     """
     distinct, row = np.unique(origins, return_inverse=True)
     first = np.concatenate([[True], np.diff(distinct) > CLOCK_SPREAD_MS])
     cluster = np.cumsum(first) - 1
     starts = distinct[first]
-    if np.any(distinct - starts[cluster] > CLOCK_SPREAD_MS):
+    if np.any(distinct - starts[cluster] > CLOCK_SPREAD_MS) or np.any((starts < 0) | (starts > LATEST_MS)):
         raise ClockError
     minutes = (starts + 30_000) // 60_000
     names = [datetime.fromtimestamp(int(minute) * 60, _LOCAL_TIME).strftime("%Y-%m-%dT%H%M") for minute in minutes]

@@ -18,6 +18,14 @@ def test_a_short_row_with_bytes_that_are_no_text(tmp_path: Path) -> None:
     assert "t.csv, from line 2 on: CSV parse error" in refused("ngsim", "summary", "t.csv", cwd=tmp_path)
 
 
+def test_a_clock_that_is_no_time(tmp_path: Path) -> None:
+    text = trajectories("  ", False)
+    for clock in (b"99999999999999999999", b"-5", b"1118846978900000"):
+        (tmp_path / "t.txt").write_bytes(text.replace(b"1118846978900", clock))
+        line = refused("ngsim", "import", "t.txt", "--out", "o", "--site", "us101", cwd=tmp_path)
+        assert "t.txt: Global_Time does not advance by 100 ms per Frame_ID" in line
+
+
 def test_columns_of_other_kinds_and_twice(tmp_path: Path) -> None:
     file = tmp_path / "e.parquet"
     numbers = {name: pa.array([0.0]) for name in ("episode", "frame", "car", "station_m", "speed_m_s")}
