@@ -119,9 +119,7 @@ def test_a_host_that_nobody_is(tmp_path: Path) -> None:
     assert "without_host: 1, such as: no host came in that drives along the main road" in none.stderr
 
 
-@pytest.mark.parametrize(
-    ("kept", "expected"), [(5000, "us101.net.xml: not a SUMO net"), (0, "us101.net.xml: not a SUMO net")]
-)
+@pytest.mark.parametrize(("kept", "expected"), [(5000, "us101.net.xml: not a SUMO net"), (0, "us101.net.xml: not XML")])
 def test_a_broken_net_is_one_line(tmp_path: Path, kept: int, expected: str) -> None:
     own_files(tmp_path)
     net = tmp_path / "us101.net.xml"

@@ -10,6 +10,8 @@ import pytest
 from command import merge_cosim, refused, small_scenario
 from scene_files import small_scene
 
+from merge_cosim.sweeps.verify import Verification
+
 
 @pytest.fixture(scope="module")
 def verified(tmp_path_factory):
@@ -79,3 +81,9 @@ def test_what_cannot_be_run_again_is_refused(swept):
     (swept / "manifest.json").write_text(json.dumps(manifest))
     rewrite(swept, lambda rows: rows.assign(case=rows["case"] + "x"))
     assert "has no case 'd" in refused("verify", swept, cwd=swept.parent)
+
+
+def test_what_came_out_in_one_line(tmp_path):
+    differences = pd.DataFrame({"column": ["delay_s", "failed"], "beyond": [0, 2], "largest": [1e-5, 1.0]})
+    assert str(Verification(tmp_path, 9, 90, differences)).endswith("2 values differ beyond the tolerance, in failed")
+    assert str(Verification(tmp_path, 9, 90, differences.iloc[:0])).endswith("every value is the same")

@@ -5,6 +5,7 @@ import pytest
 
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.estimators.compiled.drivers import IGNORE, NOT_YIELD, WAIT, YIELD, planned, reacting
+from merge_cosim.estimators.compiled.type_filter import FilterLaw
 from merge_cosim.estimators.driver_types import DRIVER_TYPES
 from merge_cosim.estimators.interactive import Interactive
 
@@ -92,3 +93,12 @@ def test_one_update_by_hand():
     a_yield, a_not_yield = 2 * (60 - 20 * 4) / 16, 3.0
     expected = ((-1.0 - a_yield) ** 2 - (-1.0 - a_not_yield) ** 2) / (2 * variance)
     assert log_odds == pytest.approx(np.clip(expected, -np.log(1e6 - 1), np.log(1e6 - 1)))
+
+
+def test_the_constants_of_the_filter_are_those_of_first_order_noise():
+    """n_t = rho n_{t-1} + e, var(e) = sigma^2 (1 - rho^2) + white^2, rho = exp(-dt / correlation_time)."""
+    found = Interactive(sigma=0.3, correlation_time=1.0, white=0.1, reaction_time=1.0, change_rate=0.05)
+    found.start(1, Setting(29.0))
+    rho = np.exp(-0.1)
+    innovation = np.sqrt(0.09 * (1 - rho**2) + 0.01)
+    assert found._filter_law == pytest.approx(FilterLaw(rho, 0.3, innovation, 0.05, 1 - rho, 0.005))

@@ -6,6 +6,7 @@ import pytest
 import merge_cosim as mc
 from merge_cosim.results import store
 from merge_cosim.results.store import SCENES_CSV, TRAFFIC_CSV
+from merge_cosim.sweeps.adding import joined
 
 TIMES = ["cycle_us", "cycle_us_single"]
 GRID = {"encounters.host_speed.step": 10, "encounters.merging_speed.step": 10, "encounters.host_offset.step": 5}
@@ -69,6 +70,7 @@ def test_what_is_there_already_is_not_run_again(tmp_path):
     again = swept(tmp_path / "out", "designed-2", ["pgm"], add=True)
     assert (again.path / "results.parquet").read_bytes() == held
     assert again.manifest["vehicle_steps"] == 0
+    assert joined(before.manifest, before.manifest, "pgm", before.path)["methods"] == ["acc", "pgm"]
 
 
 def test_scenes_are_added_with_their_facts_and_notes(tmp_path):

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.sweeps.closed_form_cases import ClosedFormCases
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.single import case_alone, trace_case
 from merge_cosim.sweeps.task import Task
@@ -34,6 +35,7 @@ def test_the_closed_form_ends_as_sumo_does(scenario, request_):
     for closed, sumo in zip(
         tasks(scenario, "closed-form", 60, **request_), tasks(scenario, "sumo", 60, **request_), strict=True
     ):
+        assert isinstance(closed.cases, ClosedFormCases)
         one, other = rows(closed, session), rows(sumo, session)
         assert set(one.pop("world")) == {"closed-form"}
         assert set(other.pop("world")) == {"sumo"}
