@@ -37,7 +37,7 @@ def in_a_process(folder: Path, *words: str, **more: str) -> str:
 
 def sweep_words(*words: str) -> tuple[str, ...]:
     coarse = [word for value in COARSE for word in ("--set", value)]
-    return ("sweep", "designed-2", *coarse, *words, "--out", "out", "--json")
+    return ("sweep", "designed-2", *coarse, *words, "--out", "out", "--overwrite", "--json")
 
 
 def methods(folder: Path) -> set[str]:
@@ -81,7 +81,7 @@ def test_an_installed_entry_point(files):
 def test_a_study_from_python(files):
     study = files / "study.py"
     coarse = {name: float(step) for name, _, step in (value.partition("=") for value in COARSE)}
-    text, changed = re.subn(r"\bplugins=", f"settings={coarse!r}, plugins=", study.read_text(encoding="utf-8"))
+    text, changed = re.subn(r"\bjobs=", f"settings={coarse!r}, jobs=", study.read_text(encoding="utf-8"))
     assert changed == 1
     study.write_text(text, encoding="utf-8")
     assert "cautious" in in_a_process(files, sys.executable, "study.py")

@@ -47,7 +47,7 @@ def test_what_reaches_nothing_or_makes_no_sense_is_refused(tmp_path, words, line
 
 
 def delays(folder, *words):
-    done = merge_cosim("sweep", "small.toml", *words, "--out", "out", "--jobs", 1, cwd=folder)
+    done = merge_cosim("sweep", "small.toml", *words, "--out", "out", "--overwrite", "--jobs", 1, cwd=folder)
     assert done.returncode == 0, done.stderr
     return pq.read_table(folder / "out/results.parquet").to_pandas().set_index(["method", "case"])["delay_s"]
 

@@ -310,7 +310,8 @@ def test_a_plugin_that_breaks_is_named(tmp_path):
     (tmp_path / "broken.py").write_text("1 / 0")
     done = merge_cosim("sweep", "small.toml", "--plugin", "broken.py", cwd=tmp_path)
     assert done.returncode == 2
-    assert "broken.py: cannot be imported: ZeroDivisionError" in done.stderr
+    assert done.stderr.startswith("merge-cosim: broken.py: cannot be imported: ")
+    assert done.stderr.endswith("broken.py, line 1, in <module>: 1 / 0: ZeroDivisionError: division by zero\n")
 
 
 def test_help_lists_and_cache(tmp_path):

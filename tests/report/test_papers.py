@@ -195,10 +195,12 @@ def test_the_studies_keep_sources_apart(tmp_path, data_dir):
         "designed",
         "pairs-surrogate",
         "nodes-surrogate",
+        "models-swept-surrogate",
         "pairs-ngsim",
         "nodes-ngsim",
+        "models-swept-ngsim",
     ]
-    real = found[3].request
+    real = found[4].request
     assert real.source == "ngsim"
     assert real.scenarios == ("us101-replay", "designed-1")
     assert real.settings == {"encounters.sites": {"us101": "test"}}
