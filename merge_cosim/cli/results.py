@@ -1,7 +1,7 @@
 """`merge-cosim report`, `summary`, `compare`, `cases`, `verify`, `reproduce`, `bounds`, `bench`: from results."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -207,7 +207,7 @@ def bounds(
     from merge_cosim.scenarios.settings import parse_setting
 
     cases, counts = bounds_of(scenario, settings=dict(map(parse_setting, set_ or ())), data=data, source=source)
-    rows: list[dict[str, Any]] = counts.to_dict("records")  # type: ignore[assignment]
+    rows = [{str(name): value for name, value in row.items()} for row in counts.to_dict("records")]
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
         cases.to_csv(out, index=False)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, NoReturn, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,6 +15,16 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.results.files import (
+    csv_rows,
+    is_whole,
+    read_json,
+    read_table,
+    replacing,
+    require,
+    write_table,
+    write_text,
+)
 from merge_cosim.results.schema import KEY, SCHEMA, SCHEMA_VERSION, VERSION_KEY
 from merge_cosim.scoring.tracks import RECORDED
 from merge_cosim.simulation.recording import trace_of
@@ -64,18 +71,6 @@ class _Part(NamedTuple):
         return cls(file, (least["scenario"], least["variation"]), least["case"])
 
 
-class _Object(dict[str, Any]):
-    """An object of a JSON file: a key that is looked for and not there is a damage of the file."""
-
-    def of(self, file: Path) -> Self:
-        """Name the file that it comes from."""
-        self._file = file
-        return self
-
-    def __missing__(self, key: str) -> NoReturn:
-        raise UserError(f"{self._file}: damaged (no '{key}'); run the sweep again")
-
-
 class ResultFolder:
     """The folder that a sweep writes to and a report reads from."""
 
@@ -103,7 +98,7 @@ class ResultFolder:
                     f"{self.path}: holds an unfinished sweep; if that runs no more, add --resume to finish it or "
                     f"--overwrite to replace it, or choose another --out"
                 )
-            changed = _changed(plan, _read_json(self._plan)) if resume else []
+            changed = _changed(plan, read_json(self._plan)) if resume else []
             if changed:
                 raise UserError(
                     f"{self.path}: the interrupted sweep was another one ({', '.join(changed)} changed); "
@@ -124,7 +119,7 @@ class ResultFolder:
             for part in self._parts.glob("*.parquet"):  # of a sweep that is replaced
                 part.unlink()
         self._parts.mkdir(parents=True, exist_ok=True)
-        _write_text(self._plan, json.dumps(plan, indent=1))
+        write_text(self._plan, json.dumps(plan, indent=1))
 
     def reopen(self, plan: dict[str, Any], drop: str) -> None:
         """Make ready for adding to a finished sweep: its rows and its facts of scenes become parts.
@@ -137,7 +132,7 @@ class ResultFolder:
             UserError: The folder holds no finished sweep, or something else was being done with it.
         """
         if self._plan.is_file():
-            changed = _changed(plan, _read_json(self._plan))
+            changed = _changed(plan, read_json(self._plan))
             if changed:
                 raise UserError(
                     f"{self.path}: holds an unfinished sweep, which is another one ({', '.join(changed)} changed); "
@@ -153,7 +148,7 @@ class ResultFolder:
             for number in range(file.num_row_groups):
                 rows = file.read_row_group(number)
                 self.add(f"{BEFORE}-{number:05d}", rows.filter(pc.not_equal(rows["method"], drop)))
-        _write_text(self._plan, json.dumps(plan, indent=1))
+        write_text(self._plan, json.dumps(plan, indent=1))
 
     def before(self, scenario: str, variation: str, columns: list[str]) -> pa.Table:
         """Of a reopened folder: the rows that it held of one scenario and variation."""
@@ -171,11 +166,11 @@ class ResultFolder:
 
     def done(self) -> set[str]:
         """Names of the batches whose parts are there, and can be read."""
-        return {file.stem for file in self._parts.glob("*.parquet") if _is_whole(file)}
+        return {file.stem for file in self._parts.glob("*.parquet") if is_whole(file)}
 
     def add(self, name: str, rows: pa.Table) -> None:
         """Store one batch's rows; from then on they are on the disk."""
-        _write_table(self._parts / f"{name}.parquet", rows)
+        write_table(self._parts / f"{name}.parquet", rows)
 
     def merge(self, more: Callable[[pa.Table], pa.Table] | None = None) -> None:
         """Join all parts into one file in the order of `KEY`, holding no more than some parts at a time.
@@ -186,7 +181,7 @@ class ResultFolder:
             more: Makes further rows from the rows of a stretch of cases, of which it gets all methods.
         """
         with (
-            _replacing(self.path / RESULTS) as unfinished,
+            replacing(self.path / RESULTS) as unfinished,
             pq.ParquetWriter(unfinished, SCHEMA, compression="zstd") as writer,
         ):
             for rows in _row_groups(_completed(rows, more) for rows in self._stretches()):
@@ -224,7 +219,7 @@ class ResultFolder:
 
     def traffic(self) -> list[dict[str, Any]]:
         """Rows of the finished sweep's table of scenes; none where there were no scenes."""
-        return _csv_rows(self.path / TRAFFIC_CSV)
+        return csv_rows(self.path / TRAFFIC_CSV)
 
     def _scene_facts(self) -> list[dict[str, Any]]:
         """Facts of the scenes of a finished sweep, as `with_scene_facts` takes them."""
@@ -232,7 +227,7 @@ class ResultFolder:
         if not file.is_file():
             return []
         notes: dict[tuple[str, ...], list[list[str]]] = {}
-        for note in _csv_rows(self.path / NOTES_CSV):
+        for note in csv_rows(self.path / NOTES_CSV):
             notes.setdefault(tuple(note[name] for name in OF_SCENE), []).append([note["event"], note["what"]])
         names = dict.fromkeys((*OF_SCENE, "model"), str)
         frame = pd.read_csv(file, dtype=names, keep_default_na=False, na_values={})  # names may be 'NA'
@@ -248,7 +243,7 @@ class ResultFolder:
     def _support_notes(self) -> list[str]:
         """How many cases begin where a model was not trained, a line per scenario, variation and model."""
         found: dict[tuple[str, ...], tuple[int, int]] = {}
-        for row in _csv_rows(self.path / SUMMARY_CSV):
+        for row in csv_rows(self.path / SUMMARY_CSV):
             outside = row.get("outside_support")
             if outside and float(outside):
                 key = tuple(row[name] for name in ("scenario", "variation", "site", "source", "model"))
@@ -261,7 +256,7 @@ class ResultFolder:
 
     def _scene_notes(self) -> list[str]:
         events: dict[str, list[dict[str, Any]]] = {}
-        for row in _csv_rows(self.path / NOTES_CSV):
+        for row in csv_rows(self.path / NOTES_CSV):
             events.setdefault(row["event"], []).append(row)
         return [
             f"{event}: {len(rows)}, such as: {rows[0]['what']} ({rows[0]['scenario']}, {rows[0]['method']}, scene "
@@ -286,7 +281,7 @@ class ResultFolder:
 
     def write_traces(self, records: pa.Table) -> None:
         """Write the cycle-by-cycle records of the illustrative cases."""
-        _write_table(self.path / TRACES, records)
+        write_table(self.path / TRACES, records)
 
     def traces(self) -> pa.Table:
         """Read them: scenario, case, method and one row per cycle.
@@ -294,14 +289,14 @@ class ResultFolder:
         Raises:
             UserError: They are missing or damaged.
         """
-        records = _read_table(self.path / TRACES)
+        records = read_table(self.path / TRACES)
         if len(records):  # of living traffic alone there are none
-            _require(self.path / TRACES, records.schema, _TRACE)
+            require(self.path / TRACES, records.schema, _TRACE)
         return records
 
     def write_json(self, name: str, document: Any) -> None:
         """Write one JSON file of the folder."""
-        _write_text(self.path / name, json.dumps(document, indent=1, allow_nan=False) + "\n")
+        write_text(self.path / name, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
     def finish(self) -> None:
         """Take the parts away, once everything is written."""
@@ -320,11 +315,11 @@ class ResultFolder:
             raise UserError(f"{self.path}: holds an unfinished sweep; if that runs no more, finish it with --resume")
         if not file.is_file():
             raise UserError(f"{file}: no results here; run a sweep first")
-        rows = _read_table(file, columns)
+        rows = read_table(file, columns)
         version = (rows.schema.metadata or {}).get(VERSION_KEY, b"none").decode()
         if version != SCHEMA_VERSION:
             raise UserError(f"{file}: result schema {version}, expected {SCHEMA_VERSION}; run the sweep again")
-        _require(file, rows.schema, [column for column in SCHEMA if not columns or column.name in columns])
+        require(file, rows.schema, [column for column in SCHEMA if not columns or column.name in columns])
         return rows
 
     def read_json(self, name: str) -> Any:
@@ -333,7 +328,7 @@ class ResultFolder:
         Raises:
             UserError: It is missing or damaged.
         """
-        return _read_json(self.path / name)
+        return read_json(self.path / name)
 
 
 def with_scene_facts(rows: pa.Table, facts: list[dict[str, Any]]) -> pa.Table:
@@ -362,64 +357,3 @@ def _row_groups(stretches: Iterable[pa.Table]) -> Iterator[pa.Table]:
 def _changed(plan: dict[str, Any], before: dict[str, Any]) -> list[str]:
     """What differs between a plan and the one before."""
     return sorted(key for key, value in json.loads(json.dumps(plan)).items() if before.get(key) != value)
-
-
-def _csv_rows(file: Path) -> list[dict[str, Any]]:
-    if not file.is_file():
-        return []
-    with file.open(encoding="utf-8", newline="") as lines:
-        return list(csv.DictReader(lines))
-
-
-def _is_whole(file: Path) -> bool:
-    try:
-        pq.read_metadata(file)
-    except (pa.ArrowInvalid, OSError):
-        return False
-    return True
-
-
-def _require(file: Path, held: pa.Schema, expected: Iterable[pa.Field]) -> None:
-    """Refuse a table that lacks a column, has it twice, or with values of another type."""
-    for column in expected:
-        types = [field.type for field in held if field.name == column.name]
-        if types != [column.type] and not (types == [pa.large_string()] and column.type == pa.string()):
-            raise UserError(f"{file}: damaged (no column '{column.name}' of type {column.type}); run the sweep again")
-
-
-def _read_table(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
-    try:
-        return pq.read_table(file, columns=columns)
-    except FileNotFoundError:
-        raise UserError(f"{file}: missing; run the sweep again") from None
-    except (pa.ArrowInvalid, OSError) as error:
-        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
-
-
-def _read_json(file: Path) -> Any:
-    try:
-        return json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=lambda pairs: _Object(pairs).of(file))
-    except FileNotFoundError:
-        raise UserError(f"{file}: missing; run the sweep again") from None
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
-
-
-def _write_table(file: Path, rows: pa.Table) -> None:
-    with _replacing(file) as unfinished:
-        pq.write_table(rows, unfinished, compression="zstd")
-
-
-def _write_text(file: Path, text: str) -> None:
-    with _replacing(file) as unfinished:
-        unfinished.write(text.encode())
-
-
-@contextmanager
-def _replacing(file: Path) -> Iterator[BinaryIO]:
-    """A file to write to, which takes the name of `file` once all of it is on the disk."""
-    with file.with_suffix(".tmp").open("wb") as unfinished:
-        yield unfinished
-        unfinished.flush()
-        os.fsync(unfinished.fileno())
-    os.replace(unfinished.name, file)

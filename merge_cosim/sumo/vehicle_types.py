@@ -17,8 +17,10 @@ ROLE = "merge-cosim.role"
 MERGE_POSITION = "merge-cosim.merge-position"
 """Parameter of the merging car's type: where its station 0 lies, in m past the gore."""
 
-COLORS = {"host": "40,160,60", "merging": "210,50,40"}
-"""As in the papers' figures."""
+RGBA = {"host": (40, 160, 60, 255), "merging": (210, 50, 40, 255)}
+"""Host and merging car, as in the papers' figures."""
+COLORS = {role: ",".join(map(str, rgba[:3])) for role, rgba in RGBA.items()}
+"""The same as text of SUMO's files."""
 
 
 def _named(name: str) -> Any:

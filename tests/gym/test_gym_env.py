@@ -2,22 +2,20 @@
 
 import warnings
 
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
 
 import merge_cosim as mc
 from merge_cosim.core.features import FEATURES
-
-gymnasium = pytest.importorskip("gymnasium")
-from gymnasium.utils.env_checker import check_env  # noqa: E402
-from gymnasium.vector import AutoresetMode  # noqa: E402
-
-from merge_cosim.gym import NAME  # noqa: E402
-from merge_cosim.gym.drawing import LANE, Drawing, body  # noqa: E402
-from merge_cosim.gym.env import MergeEnv  # noqa: E402
-from merge_cosim.gym.episodes import Episodes  # noqa: E402
-from merge_cosim.gym.settings import Options, Reward  # noqa: E402
-from merge_cosim.gym.vector import MergeVectorEnv  # noqa: E402
+from merge_cosim.gym import NAME
+from merge_cosim.gym.drawing import LANE, Drawing, body
+from merge_cosim.gym.env import MergeEnv
+from merge_cosim.gym.episodes import Episodes
+from merge_cosim.gym.settings import Options, Reward
+from merge_cosim.gym.vector import MergeVectorEnv
 
 FEW = {"encounters.count": 40}
 AGREED = {"decision_flips", "correct_at_merge", "first_stable_s"}

@@ -16,7 +16,6 @@ PAGE = Path(__file__).parents[2] / "docs" / "gym.md"
 
 
 def test_every_snippet_runs(tmp_path, monkeypatch):
-    pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)
     text = PAGE.read_text(encoding="utf-8")
     long = "GENERATIONS, CANDIDATES, CASES, HIDDEN, SEED = 40, 64, 64, 8, 0"
@@ -31,7 +30,6 @@ def test_every_snippet_runs(tmp_path, monkeypatch):
 
 
 def test_the_speed_is_measured():
-    pytest.importorskip("gymnasium")
     from gym_speed import steps_per_second
 
     assert steps_per_second(64, warm_up=2, steps=2, settings={"encounters.count": 40}) > 100

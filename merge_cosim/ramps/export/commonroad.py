@@ -6,6 +6,7 @@ Althoff, Koschi, Manzinger: CommonRoad: Composable benchmarks for motion plannin
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -42,10 +43,8 @@ def need_library() -> None:
     Raises:
         UserError: It is not installed.
     """
-    try:
-        import commonroad  # noqa: F401
-    except ImportError:
-        raise UserError("--commonroad needs commonroad-io: pip install 'merge-cosim[commonroad]'") from None
+    if find_spec("commonroad") is None:
+        raise UserError("--commonroad needs commonroad-io: pip install 'merge-cosim[commonroad]'")
 
 
 Car = Literal["host", "merging"]

@@ -18,9 +18,9 @@ from merge_cosim.sumo.options import SumoOptions
 from merge_cosim.sumo.session import Car, Errors, Session
 from merge_cosim.sumo.start import LibsumoSession, one_line
 from merge_cosim.sumo.tiles import tile_id, tile_net
+from merge_cosim.sumo.vehicle_types import RGBA
 
-COLORS = ((40, 160, 60, 255), (210, 50, 40, 255))
-"""Host and merging car, as in the papers' figures (RGBA)."""
+COLORS = (RGBA["host"], RGBA["merging"])
 
 
 class TiledWorld(GivenWorld):
