@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, TypeVar
+from threading import Event, Thread
+from typing import Any
 
-from merge_cosim.bench.loops import compare, highway
-from merge_cosim.bench.scaling import scaling
+from merge_cosim.bench.loops import ALTERNATIVES, compare
+from merge_cosim.bench.peers import CASE, peers
+from merge_cosim.bench.regression import against
+from merge_cosim.bench.scaling import beside, methods_scaling, scaling
 from merge_cosim.bench.scenes import METHOD as SCENE_METHOD
 from merge_cosim.bench.scenes import SCENARIO as SCENE_SCENARIO
 from merge_cosim.bench.scenes import scene_costs
 from merge_cosim.bench.updates import estimator_costs
 from merge_cosim.bench.worlds import SCENARIO as WORLD_SCENARIO
 from merge_cosim.bench.worlds import world_costs
+from merge_cosim.core.errors import UserError
 from merge_cosim.sweeps.identity import versions
-
-T = TypeVar("T")
 
 HEAD = """# Bench
 
@@ -45,24 +48,53 @@ starts SUMO for every case, `traci` talks to one sumo over a socket (the wait fo
 """
 WORLDS = """## SUMO and the closed form
 
-Processor time per vehicle and step [us] by method in one process, scoring and result rows included: `{scenario}` in
-SUMO ({cases} cases), and with `--world closed-form` (all cases).
+Processor time per vehicle and step [us] by method in one process, scoring and result rows included: `{world_scenario}`
+in SUMO ({cases} cases), and with `--world closed-form` (all cases). `update_us` is the wall
+time of it that estimator and controller take: the rest is the loop's.
 """
 UPDATES = """## One update of each estimator
 
 Processor time per encounter [us], in a full batch and alone.
 """
+PEERS = """## Other simulators
+
+Simulated steps of one scene, and vehicles times steps, per second of processor time. Ours is the vector environment
+with 4,096 encounters under random actions, observing, rewarding and scoring included. highway-env moves cars by models
+of its own in Python. commonroad-sumo replays the two cars of `{commonroad_case}`, exported by `merge-cosim export
+--commonroad`, in SUMO and takes the states over; it neither estimates nor scores. Building networks and starting SUMO
+are not counted.
+"""
+METHODS = """## Growth over methods
+
+Processor time of the whole command on {growth_cases} cases of `designed-random` in the closed form, one process, with
+more and more methods.
+"""
 SCENES = """## Living traffic
 
-`{scenario}` on {copies} copies of the ramp in one process, three minutes from empty, hosts driven by `{method}`. The
-real-time factor is simulated time over wall time of the whole loop, observing, estimating and commanding included;
-`cars` is the mean over the run.
+`{scene_scenario}` on {copies} copies of the ramp in one process, three minutes from empty, hosts driven by
+`{scene_method}`. The real-time factor is simulated time over wall time of the whole loop, observing, estimating and
+commanding included; `cars` is the mean over the run.
 """
 SCALING = """## Whole sweeps by cases and processes
 
 `designed-random` under `acc`. `run_s` is the time with all processes at work, their start included; `loop_ms_per_case`
 is the time in the loops, summed over processes; `peak_mib` is the largest process.
 """
+OTHER = """## Another version
+
+One sweep in SUMO by this version and by the other one, in turns; a ratio above 1 says that this one is slower.
+"""
+AGAINST = """## Against the bench of {before_date}
+
+Ratios of processor times within one run, which hold across machines better than times do; larger is better. One that
+fell by more than {tolerance} % is marked.
+"""
+MOST = 10_000
+"""Cases with which growth over methods is measured and another version compared, at most."""
+TOLERANCE = 0.15
+"""How much a ratio may fall before it counts as a regression."""
+PARTS = ("loops", "worlds", "estimators", "peers", "methods", "scenes", "scaling")
+"""The parts of the bench, in the order of the page."""
 
 
 def bench(
@@ -72,8 +104,11 @@ def bench(
     largest: int = 100_000,
     jobs: int | None = None,
     copies: int = 16,
+    only: Sequence[str] = (),
+    commonroad_python: Path | None = None,
+    other: Path | None = None,
 ) -> dict[str, Any]:
-    """Take all figures.
+    """Take the figures.
 
     Args:
         cases: Cases that our loop runs.
@@ -82,30 +117,72 @@ def bench(
         largest: Cases of the largest sweep; those of a tenth and a hundredth are run, too.
         jobs: Processes of the sweeps on several; one per core by default.
         copies: Copies of the ramp that living traffic is timed on.
+        only: Names of `PARTS` to take; empty for all.
+        commonroad_python: Python of an environment with commonroad-sumo, to time it, too.
+        other: Checkout of another version, to run one sweep by both in turns.
+
+    Raises:
+        UserError: A name in `only` is none of `PARTS`; a path is not what it should be; an alternative decides
+            otherwise than our loop.
     """
+    if unknown := [name for name in only if name not in PARTS]:
+        raise UserError(f"bench: no part {unknown[0]!r}; the parts are {', '.join(PARTS)}")
+    if commonroad_python is not None and not commonroad_python.is_file():
+        raise UserError(f"{commonroad_python}: no such file; name the Python of an environment with commonroad-sumo")
+    if other is not None and not (other / "merge_cosim" / "cli" / "main.py").is_file():
+        raise UserError(f"{other}: no checkout of merge-cosim; name the folder that holds merge_cosim/")
     several = jobs or os.cpu_count() or 1
     sizes = sorted({max(1, largest // 100), max(1, largest // 10), largest})
-    loads: dict[str, float | None] = {}
-
-    def watched(part: str, take: Callable[[], T]) -> T:
-        before, taken = load(), take()
-        loads[part] = max((one for one in (before, load()) if one is not None), default=None)
-        return taken
-
-    return {
+    takes: dict[str, Callable[[], Any]] = {
+        "loops": lambda: compare(cases, sample, rounds),
+        "worlds": lambda: world_costs(cases, rounds),
+        "estimators": lambda: estimator_costs(rounds),
+        "peers": lambda: peers(commonroad_python),
+        "methods": lambda: methods_scaling(min(largest, MOST), rounds),
+        "scenes": lambda: scene_costs(copies),
+        "scaling": lambda: scaling(sizes, sorted({1, several}), rounds),
+    }
+    if other is not None:
+        takes["other"] = lambda: beside(other, min(largest, MOST), rounds)
+    found: dict[str, Any] = {
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "machine": machine(),
         "versions": versions(),
         "rounds": rounds,
-        **watched("loops", lambda: compare(cases, sample, rounds)),
-        "highway_env": watched("highway_env", highway),
-        "worlds": watched("worlds", lambda: world_costs(cases, rounds)),
-        "estimators": watched("estimators", lambda: estimator_costs(rounds)),
         "copies": copies,
-        "scenes": watched("scenes", lambda: scene_costs(copies)),
-        "scaling": watched("scaling", lambda: scaling(sizes, sorted({1, several}), rounds)),
-        "load": loads,
+        "cases": cases,
+        "growth_cases": min(largest, MOST),
+        "load": {},
     }
+    for part in takes if not only else [*only, *(("other",) if other is not None else ())]:
+        with _LoadWatch() as watch:
+            figures = takes[part]()
+        found["load"][part] = watch.highest
+        found |= figures if part == "loops" else {part: figures}
+    return found
+
+
+class _LoadWatch:
+    """The highest load of the machine from entering to leaving, looked up every few seconds."""
+
+    def __enter__(self) -> _LoadWatch:
+        self.highest = load()
+        self._over = Event()
+        self._thread = Thread(target=self._watch, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+        self._look()
+
+    def _watch(self) -> None:
+        while not self._over.wait(5.0):
+            self._look()
+
+    def _look(self) -> None:
+        self.highest = max((one for one in (self.highest, load()) if one is not None), default=None)
 
 
 def load() -> float | None:
@@ -114,9 +191,12 @@ def load() -> float | None:
 
 
 def crowded(found: Mapping[str, Any], part: str) -> str:
-    """A mark for a part of the figures during which the load exceeded the cores; empty if it did not."""
+    """A mark for a part of the figures during which the load exceeded the cores; empty if it did not.
+
+    Our own processes count, so a part that keeps every core busy is allowed half a process more.
+    """
     seen, cores = found["load"][part], found["machine"]["cores"]
-    if seen is None or seen <= cores:
+    if seen is None or seen <= cores + 0.5:
         return ""
     return f"**The load rose to {seen} on {cores} cores: wall times of this part are too long.**\n"
 
@@ -132,12 +212,48 @@ def machine() -> dict[str, Any]:
     }
 
 
-def page(found: Mapping[str, Any], command: str) -> str:
-    """The figures as a page in Markdown."""
+def page(found: Mapping[str, Any], command: str, before: Mapping[str, Any] | None = None) -> str:
+    """The figures as a page in Markdown, and beside those of an earlier bench where there is one."""
     where = found["machine"]
     described = f"{where['processor']}, {where['cores']} cores, {where['memory_gib']} GiB, {where['system']}"
     versions_used = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
-    loops = [
+    load_before = where["load_before"]
+    parts = [
+        HEAD.format(
+            command=command,
+            machine=f"{described}; {versions_used}",
+            load=""
+            if load_before is None
+            else f"Load of the machine before the start: {load_before} (0: nothing ran).",
+            **_only(found, "date", "rounds"),
+        )
+    ]
+    heads = {"worlds": WORLDS, "peers": PEERS, "estimators": UPDATES, "methods": METHODS, "scenes": SCENES}
+    values = {
+        **_only(found, "cases", "copies", "growth_cases"),
+        "world_scenario": WORLD_SCENARIO,
+        "commonroad_case": " ".join(CASE),
+    }
+    values |= {"scene_scenario": SCENE_SCENARIO, "scene_method": SCENE_METHOD}
+    for part in found["load"]:
+        mark = crowded(found, part)
+        if part == "loops":
+            parts += [LOOPS.format(**_only(found, "cases", "scenario", "method", "sample")), mark, _loops(found)]
+        elif part == "scaling":
+            parts += [SCALING, mark, _table(found["scaling"]), *_gains(found["scaling"])]
+        elif part == "other":
+            parts += [OTHER, mark, _table([found["other"]])]
+        elif found[part]:
+            parts += [heads[part].format(**values), mark, _table(found[part])]
+    if before is not None:
+        rows = against(found, before, TOLERANCE)
+        parts += [AGAINST.format(tolerance=round(100 * TOLERANCE), before_date=before["date"])]
+        parts += [_table(rows) if rows else "The two have no ratio in common.\n"]
+    return "\n".join(filter(None, parts))
+
+
+def _loops(found: Mapping[str, Any]) -> str:
+    rows = [
         {
             "loop": name or "ours",
             "us per vehicle and step": found["_".join(filter(None, (name, "us_per_vehicle_step")))],
@@ -145,52 +261,30 @@ def page(found: Mapping[str, Any], command: str) -> str:
             "ours is faster by": found.get(f"speedup_vs_{name}", ""),
             "by cpu": found.get(f"cpu_speedup_vs_{name}", ""),
         }
-        for name in ("", "scalar", "restart", "traci")
+        for name in ("", *ALTERNATIVES)
     ]
-    before = where["load_before"]
-    parts = [
-        HEAD.format(
-            command=command,
-            machine=f"{described}; {versions_used}",
-            load="" if before is None else f"Load of the machine before the start: {before} (0: nothing else ran).",
-            **_only(found, "date", "rounds"),
-        ),
-        LOOPS.format(**_only(found, "cases", "scenario", "method", "sample")),
-        crowded(found, "loops"),
-        _table(loops),
-        f"Ours: {found['vehicle_steps_per_s']:,} vehicle-steps per second; wall time over the time inside "
-        f"`simulationStep` of the same run: **{found['ratio_to_bare_sumo']}**.\n",
-    ]
-    if found["highway_env"]:
-        theirs = found["highway_env"]
-        parts.append(
-            f"For scale, another simulator with other models: `merge-v0` of highway-env {theirs['version']} makes "
-            f"{theirs['steps_per_s']:,} simulated steps, {theirs['vehicle_steps_per_s']:,} vehicle-steps, per second "
-            f"({theirs['vehicle_steps_per_cpu_s']:,} vehicle-steps per second of processor time).\n"
-        )
-    parts += [WORLDS.format(scenario=WORLD_SCENARIO, cases=found["cases"]), crowded(found, "worlds")]
-    parts += [_table(found["worlds"]), UPDATES, crowded(found, "estimators"), _table(found["estimators"])]
-    parts += [
-        SCENES.format(scenario=SCENE_SCENARIO, method=SCENE_METHOD, copies=found["copies"]),
-        crowded(found, "scenes"),
-        _table(found["scenes"]),
-    ]
-    parts += [SCALING, crowded(found, "scaling"), _table(found["scaling"])]
-    largest = found["scaling"][-1]
-    for alone in found["scaling"]:
-        if alone["cases"] == largest["cases"] and alone is not largest:
-            parts.append(
-                f"Over {largest['cases']:,} cases {largest['processes']} processes are "
-                f"{alone['run_s'] / largest['run_s']:.2f} times as fast as {alone['processes']} by `run_s`, and "
-                f"{alone['wall_s'] / largest['wall_s']:.2f} times with planning and summing up, done by one.\n"
-            )
-    return "\n".join(filter(None, parts))
+    return _table(rows) + (
+        f"\nOurs: {found['vehicle_steps_per_s']:,} vehicle-steps per second; wall time over the time inside "
+        f"`simulationStep` of the same run: **{found['ratio_to_bare_sumo']}**.\n"
+    )
 
 
-def write_page(file: Path, found: Mapping[str, Any], command: str) -> None:
-    """Write the page."""
+def _gains(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    largest = rows[-1]
+    return [
+        f"Over {largest['cases']:,} cases {largest['processes']} processes are "
+        f"{alone['run_s'] / largest['run_s']:.2f} times as fast as {alone['processes']} by `run_s`, and "
+        f"{alone['wall_s'] / largest['wall_s']:.2f} times with planning and summing up, done by one.\n"
+        for alone in rows
+        if alone["cases"] == largest["cases"] and alone is not largest
+    ]
+
+
+def write_page(file: Path, found: Mapping[str, Any], command: str, before: Mapping[str, Any] | None = None) -> None:
+    """Write the page, and the figures beside it as JSON, for `merge-cosim bench --against`."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(page(found, command), encoding="utf-8")
+    file.write_text(page(found, command, before), encoding="utf-8")
+    file.with_suffix(".json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 def _only(found: Mapping[str, Any], *names: str) -> dict[str, Any]:

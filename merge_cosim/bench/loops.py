@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import subprocess
@@ -10,7 +9,6 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -30,7 +28,6 @@ SCENARIO, METHOD = "designed-2", "acc"
 """What is run: the laws of this scenario and method are the ones that the alternatives spell out."""
 ALTERNATIVES = {"scalar": "scalar.py", "restart": "restart.py", "traci": "traci_socket.py"}
 """The alternatives and their scripts in `tools/bench`."""
-HIGHWAY = "highway_merge.py"
 
 
 @dataclass(frozen=True)
@@ -90,19 +87,6 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
         **{f"{name}_cpu_us_per_vehicle_step": round(time, 3) for name, time in their_cpu.items()},
         **{f"speedup_vs_{name}": round(time / own, 2) for name, time in theirs.items()},
         **{f"cpu_speedup_vs_{name}": round(time / own_cpu, 2) for name, time in their_cpu.items()},
-    }
-
-
-def highway() -> dict[str, Any] | None:
-    """Simulated steps, and vehicles times steps, per second of highway-env's merge scene; None if not installed."""
-    if importlib.util.find_spec("highway_env") is None:
-        return None
-    found = _json_of(HIGHWAY)
-    return {
-        "version": version("highway-env"),
-        "steps_per_s": round(found["steps"] / found["wall_s"], 1),
-        "vehicle_steps_per_s": round(found["vehicle_steps"] / found["wall_s"], 1),
-        "vehicle_steps_per_cpu_s": round(found["vehicle_steps"] / found["cpu_s"], 1),
     }
 
 

@@ -26,7 +26,7 @@ def world_costs(cases: int, rounds: int) -> list[dict[str, Any]]:
         rounds: How often each is timed, in turns; the median counts.
     """
     tasks = {(world, task.method.name): _few(task, cases) for world in WORLDS for task in _tasks(world)}
-    times: dict[tuple[WorldKind, str], list[float]] = {kind: [] for kind in tasks}
+    times: dict[tuple[WorldKind, str], list[tuple[float, float]]] = {kind: [] for kind in tasks}
     session = WorkerSession()
     for task in tasks.values():
         task.part(0, min(50, len(task))).run(session)  # to warm up
@@ -34,12 +34,14 @@ def world_costs(cases: int, rounds: int) -> list[dict[str, Any]]:
         for kind, task in tasks.items():
             times[kind].append(_cpu_us(task, session))
     session.close()
+    cpu = {kind: median(one for one, _ in found) for kind, found in times.items()}
     return [
         {
             "method": name,
-            "sumo_cpu_us": round(sumo := median(times["sumo", name]), 3),
-            "closed_form_cpu_us": round(closed := median(times["closed-form", name]), 3),
-            "closed_form_is_cheaper_by": round(sumo / closed, 1),
+            "sumo_cpu_us": round(cpu["sumo", name], 3),
+            "closed_form_cpu_us": round(cpu["closed-form", name], 3),
+            "update_us": round(median(update for _, update in times["closed-form", name]), 3),
+            "closed_form_is_cheaper_by": round(cpu["sumo", name] / cpu["closed-form", name], 1),
         }
         for name in METHODS
     ]
@@ -55,9 +57,11 @@ def _few(task: Task, cases: int) -> Task:
     return task.take(np.linspace(0, len(task) - 1, min(cases, len(task))).round().astype(np.int64))
 
 
-def _cpu_us(task: Task, session: WorkerSession) -> float:
-    begin, steps = process_time(), 0
+def _cpu_us(task: Task, session: WorkerSession) -> tuple[float, float]:
+    """Processor time of everything, and wall time of estimating and controlling alone."""
+    begin, steps, method = process_time(), 0, 0.0
     for first in range(0, len(task), task.most):
         _, effort = task.part(first, min(first + task.most, len(task))).run(session)
         steps += effort.vehicle_steps
-    return 1e6 * (process_time() - begin) / steps
+        method += effort.method_s
+    return 1e6 * (process_time() - begin) / steps, 1e6 * method / steps

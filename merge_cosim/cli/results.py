@@ -225,24 +225,44 @@ def bench(
     largest: Annotated[int, typer.Option(min=1, help="Cases of the largest sweep.")] = 100_000,
     jobs: Jobs = None,
     copies: Annotated[int, typer.Option(min=1, help="Copies of the ramp that living traffic is timed on.")] = 16,
-    page: Annotated[Path | None, typer.Option(help="Write the figures as a page in Markdown, too.")] = None,
+    only: Annotated[list[str] | None, typer.Option(help="Part to take, several times for several.")] = None,
+    commonroad_python: Annotated[
+        Path | None, typer.Option(help="Python of an environment with commonroad-sumo and eclipse-sumo: time it, too.")
+    ] = None,
+    other: Annotated[
+        Path | None, typer.Option(help="Checkout of another version: run one sweep by both, in turns.")
+    ] = None,
+    against: Annotated[
+        Path | None, typer.Option(help="JSON of an earlier bench: compare ratios; status 1 if one fell by 15 %.")
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option(help="Write the figures as a page in Markdown, and as JSON beside it.")
+    ] = None,
     json: Json = False,
 ) -> None:
-    """Time the loop, its alternatives, every estimator, living traffic, and sweeps by cases and processes."""
+    """Time the loop, its alternatives, other simulators, every estimator, living traffic, and whole sweeps."""
     from merge_cosim.bench import bench as figures
+    from merge_cosim.bench import regression
 
-    found = figures.bench(cases, sample, rounds, largest, jobs, copies)
+    before = None if against is None else regression.read_figures(against)
+    found = figures.bench(cases, sample, rounds, largest, jobs, copies, only or (), commonroad_python, other)
     command = (
         f"merge-cosim bench --cases {cases} --sample {sample} --rounds {rounds} --largest {largest} --copies {copies}"
     )
-    if jobs is not None:
-        command += f" --jobs {jobs}"
+    command += "".join(f" --only {part}" for part in only or ())
+    named = {"--jobs": jobs, "--commonroad-python": commonroad_python and "PYTHON", "--other": other and "CHECKOUT"}
+    command += "".join(f" {option} {value}" for option, value in named.items() if value is not None)
     for part in found["load"]:
         if crowded := figures.crowded(found, part):
             typer.echo(f"{part}: {crowded.strip().strip('*')}", err=True)
     if page is not None:
-        figures.write_page(page, found, command)
+        figures.write_page(page, found, command, before)
     if json:
         print_json(found)
     else:
-        typer.echo(figures.page(found, command))
+        typer.echo(figures.page(found, command, before))
+    worse = [row for row in regression.against(found, before, figures.TOLERANCE) if row["worse"]] if before else []
+    for row in worse:
+        typer.echo(f"{row['ratio']}: {row['before']} before, {row['now']} now", err=True)
+    if worse:
+        raise typer.Exit(1)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import merge_cosim as mc
+from merge_cosim.bench.peers import environment_steps
 from merge_cosim.controllers.policy import Policy, save_policy
 from merge_cosim.core.features import FEATURES
 from merge_cosim.core.observation import Observation, Setting
@@ -30,9 +31,7 @@ def test_every_snippet_runs(tmp_path, monkeypatch):
 
 
 def test_the_speed_is_measured():
-    from gym_speed import steps_per_second
-
-    assert steps_per_second(64, warm_up=2, steps=2, settings={"encounters.count": 40}) > 100
+    assert environment_steps(64, warm_up=2, steps=2, settings={"encounters.count": 40}) > 100
 
 
 def test_a_policy_is_the_network_that_was_saved(tmp_path):
