@@ -100,7 +100,7 @@ class Episodes(Loop):
             else TiledWorld(task.ramp, slots, task.seed, host=cases.host)
         )
         car, rules = task.scenario.merging_car(), task.scenario.test
-        super().__init__(self._pairs, cases.pairs, self._hosts, car, rules, task.setting, seed=task.seed)
+        super().__init__(self._pairs, cases.encounters, self._hosts, car, rules, task.setting, seed=task.seed)
 
     def find(self, cases: Sequence[str] | Sequence[int] | AnyArray) -> IntArray:
         """Numbers of encounters that are given by name or number.

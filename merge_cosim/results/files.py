@@ -88,7 +88,13 @@ def read_json(file: Path) -> Any:
 def write_table(file: Path, rows: pa.Table) -> None:
     """Write a Parquet file, whole or not at all."""
     with replacing(file) as unfinished:
-        pq.write_table(rows, unfinished, compression="zstd")
+        pq.write_table(rows, unfinished, **parquet_options(rows.schema))
+
+
+def parquet_options(schema: pa.Schema) -> dict[str, Any]:
+    """How tables are written: texts by dictionary, as they repeat; numbers as they are, in half the time."""
+    texts = [column.name for column in schema if column.type == pa.string() and column.name != "case"]
+    return {"compression": "zstd", "use_dictionary": texts}
 
 
 def write_text(file: Path, text: str) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import groupby
+from itertools import chain, groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +20,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.results.files import (
     csv_rows,
     is_whole,
+    parquet_options,
     read_json,
     read_table,
     replacing,
@@ -55,6 +58,10 @@ _TRACE = [
 
 STRETCH_ROWS = 100_000
 """Rows that are sorted and written at a time; more where more cases lie between each other."""
+PART_ROWS = 1_000_000
+"""A file with so many rows gets no more: `results.parquet` of more rows is a folder of such files."""
+BATCH_ROWS = 250_000
+"""Rows from which a batch of whole cases is full."""
 
 
 class _Part(NamedTuple):
@@ -144,10 +151,9 @@ class ResultFolder:
         for part in self._parts.glob("*.parquet"):
             part.unlink()
         self.add(f"{BEFORE}-scenes", with_scene_facts(SCHEMA.empty_table(), self._scene_facts()))
-        with pq.ParquetFile(self.path / RESULTS) as file:
-            for number in range(file.num_row_groups):
-                rows = file.read_row_group(number)
-                self.add(f"{BEFORE}-{number:05d}", rows.filter(pc.not_equal(rows["method"], drop)))
+        for number, (file, group) in enumerate(self._row_groups()):
+            rows = file.read_row_group(group)
+            self.add(f"{BEFORE}-{number:05d}", rows.filter(pc.not_equal(rows["method"], drop)))
         write_text(self._plan, json.dumps(plan, indent=1))
 
     def before(self, scenario: str, variation: str, columns: list[str]) -> pa.Table:
@@ -173,19 +179,28 @@ class ResultFolder:
         write_table(self._parts / f"{name}.parquet", rows)
 
     def merge(self, more: Callable[[pa.Table], pa.Table] | None = None) -> None:
-        """Join all parts into one file in the order of `KEY`, holding no more than some parts at a time.
+        """Join all parts in the order of `KEY`, holding no more than some parts at a time.
 
-        The parts stay until `finish`.
+        What comes of it is a file or, of more than `PART_ROWS` rows, a folder of files. The parts stay until `finish`.
 
         Args:
             more: Makes further rows from the rows of a stretch of cases, of which it gets all methods.
         """
-        with (
-            replacing(self.path / RESULTS) as unfinished,
-            pq.ParquetWriter(unfinished, SCHEMA, compression="zstd") as writer,
-        ):
-            for rows in _row_groups(_completed(rows, more) for rows in self._stretches()):
-                writer.write_table(rows, row_group_size=len(rows))
+        whole, unfinished = self.path / RESULTS, (self.path / RESULTS).with_suffix(".tmp")
+        shutil.rmtree(unfinished, ignore_errors=True)
+        unfinished.mkdir()
+        groups = _row_groups(_completed(rows, more) for rows in self._stretches())
+        files = 0
+        while files == 0 or (first := next(groups, None)) is not None:
+            begun = chain(() if files == 0 else (first,), groups)
+            _write_groups(unfinished / f"part-{files:05d}.parquet", begun)
+            files += 1
+        _remove(whole)
+        if files == 1:
+            os.replace(unfinished / "part-00000.parquet", whole)
+            unfinished.rmdir()
+        else:
+            os.replace(unfinished, whole)
 
     def _stretches(self) -> Iterator[pa.Table]:
         """All stored rows, scenario by scenario, in stretches of whole cases that follow each other by name."""
@@ -266,18 +281,45 @@ class ResultFolder:
 
     def groups(self) -> list[tuple[str, str]]:
         """The scenarios and variations of the merged file, in its order."""
-        seen: dict[tuple[str, str], None] = {}
-        with pq.ParquetFile(self.path / RESULTS) as file:
-            for number in range(file.num_row_groups):
-                names = file.read_row_group(number, columns=["scenario", "variation"])
-                pairs = names.group_by(["scenario", "variation"]).aggregate([]).to_pylist()
-                seen |= dict.fromkeys((pair["scenario"], pair["variation"]) for pair in pairs)
-        return sorted(seen)
+        return sorted({_group_of(file, number) for file, number in self._row_groups()})
 
-    def rows_of(self, scenario: str, variation: str, columns: list[str] | None = None) -> pa.Table:
-        """The merged file's rows of one scenario and variation."""
-        which = [("scenario", "=", scenario), ("variation", "=", variation)]
-        return pq.read_table(self.path / RESULTS, columns=columns, filters=which)
+    def batches(self, scenario: str, variation: str, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """The merged rows of one scenario and variation, in batches of whole cases.
+
+        Args:
+            scenario: The scenario.
+            variation: The variation.
+            columns: Columns to read beside `case`; None for all.
+        """
+        wanted = None if columns is None else [*dict.fromkeys(("case", *columns))]
+        held: list[pa.Table] = []
+        for file, number in self._row_groups():
+            if _group_of(file, number) != (scenario, variation):
+                continue
+            held.append(file.read_row_group(number, columns=wanted))
+            if sum(map(len, held)) >= BATCH_ROWS:
+                rows = pa.concat_tables(held)
+                whole = pc.not_equal(rows["case"], rows["case"][-1])  # the last case may go on in the next group
+                if pc.any(whole).as_py():
+                    yield rows.filter(whole)
+                    held = [rows.filter(pc.invert(whole))]
+        if held:
+            yield pa.concat_tables(held)
+
+    def count(self, scenario: str, variation: str) -> int:
+        """Number of merged rows of one scenario and variation."""
+        groups = (
+            (file, number) for file, number in self._row_groups() if _group_of(file, number) == (scenario, variation)
+        )
+        return sum(file.metadata.row_group(number).num_rows for file, number in groups)
+
+    def _row_groups(self) -> Iterator[tuple[pq.ParquetFile, int]]:
+        """The groups of rows of the merged files, in their order; each is of one scenario and variation."""
+        whole = self.path / RESULTS
+        for path in sorted(whole.glob("*.parquet")) if whole.is_dir() else [whole]:
+            with pq.ParquetFile(path) as file:
+                for number in range(file.num_row_groups):
+                    yield file, number
 
     def write_traces(self, records: pa.Table) -> None:
         """Write the cycle-by-cycle records of the illustrative cases."""
@@ -313,7 +355,7 @@ class ResultFolder:
         file = self.path / RESULTS
         if self._plan.is_file():  # what else is here may be of an earlier sweep
             raise UserError(f"{self.path}: holds an unfinished sweep; if that runs no more, finish it with --resume")
-        if not file.is_file():
+        if not file.exists():
             raise UserError(f"{file}: no results here; run a sweep first")
         rows = read_table(file, columns)
         version = (rows.schema.metadata or {}).get(VERSION_KEY, b"none").decode()
@@ -352,6 +394,33 @@ def _row_groups(stretches: Iterable[pa.Table]) -> Iterator[pa.Table]:
                 yield held[:STRETCH_ROWS]
                 held = held[STRETCH_ROWS:]
         yield held
+
+
+def _write_groups(file: Path, groups: Iterable[pa.Table]) -> None:
+    """Write groups of rows to a file until it has `PART_ROWS` rows, or there are no more."""
+    with (
+        replacing(file) as unfinished,
+        pq.ParquetWriter(unfinished, SCHEMA, **parquet_options(SCHEMA)) as writer,
+    ):
+        written = 0
+        for rows in groups:
+            writer.write_table(rows, row_group_size=len(rows))
+            written += len(rows)
+            if written >= PART_ROWS:
+                break
+
+
+def _group_of(file: pq.ParquetFile, number: int) -> tuple[str, str]:
+    """Scenario and variation of a group of rows."""
+    first = file.read_row_group(number, columns=["scenario", "variation"])[:1].to_pylist()[0]
+    return first["scenario"], first["variation"]
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _changed(plan: dict[str, Any], before: dict[str, Any]) -> list[str]:

@@ -12,7 +12,6 @@ import pandas as pd
 
 from merge_cosim.core.encounter import Encounters, Intention
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.units import FloatArray
 from merge_cosim.ngsim.data import data_files, episode_files, load_trajectories
 from merge_cosim.ngsim.pairing.encounters import at_site_point, site_encounters
 from merge_cosim.ngsim.pairing.split import split_cars
@@ -20,6 +19,7 @@ from merge_cosim.ngsim.sites import Site, shipped_sites, site
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.scenarios.hidden import hidden_encounters
+from merge_cosim.scenarios.random_states import RandomStates
 from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Table, Traffic
 from merge_cosim.sumo.route_reader import read_sumocfg
@@ -41,7 +41,7 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
     if isinstance(scenario.encounters, Grid):
         return _grid(scenario.encounters)
     if isinstance(scenario.encounters, Random):
-        return _random(scenario.encounters)
+        return RandomStates.of(scenario.encounters).drawn()
     if isinstance(scenario.encounters, ByArrival):
         encounters = hidden_encounters(scenario.encounters)
         return replace(encounters, label=scenario.merging_car().intentions(encounters))
@@ -124,35 +124,14 @@ def _grid(grid: Grid) -> Encounters:
     axes = (grid.host_offset.values(), grid.host_speed.values(), grid.merging_speed.values())
     offset, host_speed, merging_speed = (np.array(column) for column in zip(*product(*axes), strict=True))
     cases = [f"d{d:+g}_h{h:g}_m{m:g}" for d, h, m in zip(offset, host_speed, merging_speed, strict=True)]
-    return _designed(grid, "designed", cases, offset, host_speed, merging_speed)
-
-
-def _random(states: Random) -> Encounters:
-    spans = (states.host_offset, states.host_speed, states.merging_speed)
-    low, width = np.array([(span.first, span.last - span.first) for span in spans]).T
-    shares = np.random.default_rng(states.seed).random((states.count, 3))  # by rows: fewer are the first ones
-    offset, host_speed, merging_speed = (low + width * shares).T.copy()
-    cases = [f"r{number:07d}" for number in range(states.count)]
-    return _designed(states, "random", cases, offset, host_speed, merging_speed)
-
-
-def _designed(
-    states: Grid | Random,
-    source: str,
-    cases: list[str],
-    offset: FloatArray,
-    host_speed: FloatArray,
-    merging_speed: FloatArray,
-) -> Encounters:
-    """Encounters from initial states."""
     return Encounters.unlogged(
         np.array(cases),
         "designed",
-        source,
-        host_station=states.merging_station + offset,
+        "designed",
+        host_station=grid.merging_station + offset,
         host_speed=host_speed,
-        host_length=states.length,
-        merging_station=states.merging_station,
+        host_length=grid.length,
+        merging_station=grid.merging_station,
         merging_speed=merging_speed,
-        merging_length=states.length,
+        merging_length=grid.length,
     )

@@ -100,7 +100,7 @@ class Random(Strict):
     The first cases of a larger count are the cases of a smaller one.
 
     Attributes:
-        count: Number of cases.
+        count: Number of cases, at most ten million: their names have seven digits.
         seed: Seed of the draw.
         merging_station: The merging car's initial station [m].
         host_offset: The host's initial station minus the merging car's [m]; positive is ahead.
@@ -110,7 +110,7 @@ class Random(Strict):
     """
 
     kind: Literal["random"]
-    count: PositiveInt
+    count: Annotated[int, Field(gt=0, le=10_000_000)]
     seed: NonNegativeInt = 0
     merging_station: Annotated[float, Field(lt=0)] = -90.0
     host_offset: Range

@@ -20,6 +20,7 @@ from merge_cosim.core.units import DT, FloatArray, IntArray
 from merge_cosim.ngsim.pairing.recordings import LoggedScene, pair_in_scene
 from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.ramps.view import view_options
+from merge_cosim.scenarios.random_states import RandomStates
 from merge_cosim.scenarios.sources import Routes, Traffic
 from merge_cosim.scoring.rules import Rules, expected_cycles
 from merge_cosim.simulation.loop import Run
@@ -85,16 +86,18 @@ class Cases(ABC):
 
     Attributes:
         world: What moves their cars, see `World.kind`.
+        scenes: Their encounters are found on the way.
         most: Most of them that are handed out at a time.
     """
 
     world: ClassVar[WorldKind] = "sumo"
+    scenes: ClassVar[bool] = False
     most: ClassVar[int]
 
     @property
     @abstractmethod
     def encounters(self) -> Encounters | None:
-        """The encounters; None where they are found on the way."""
+        """The encounters; None where they are found on the way. Random ones are drawn anew at each call."""
 
     @abstractmethod
     def __len__(self) -> int: ...
@@ -133,16 +136,23 @@ class Cases(ABC):
             human: The hosts drive as they were logged, without SUMO.
         """
 
+    @abstractmethod
+    def number(self, case: str) -> int | None:
+        """Number of a case by its name, or of the one in which it is found; None if there is none."""
+
     def find(self, case: str) -> int:
-        """Number of a case by its name, or of the one in which it is found.
+        """The same.
 
         Raises:
             UserError: There is none.
         """
-        names = [self.name(number) for number in range(len(self))]
-        if case in names:
-            return names.index(case)
-        few = did_you_mean(case, names) if len(names) <= 12 else f" (such as {names[0]}, {names[-1]})"
+        number = self.number(case)
+        if number is not None:
+            return number
+        if len(self) <= 12:
+            few = did_you_mean(case, [self.name(number) for number in range(len(self))])
+        else:
+            few = f" (such as {self.name(0)}, {self.name(len(self) - 1)})"
         raise UserError(f"no case '{case}'{few}")
 
 
@@ -156,20 +166,21 @@ class PairCases(Cases):
     """
 
     most: ClassVar[int] = CHUNK_CASES
-    pairs: Encounters
+    pairs: Encounters | RandomStates
     host: Way = field(default="main", kw_only=True)
 
     @property
     def encounters(self) -> Encounters:
         """See `Cases`."""
-        return self.pairs
+        return self.pairs if isinstance(self.pairs, Encounters) else self.pairs.drawn()
 
     def __len__(self) -> int:
         return len(self.pairs)
 
     def name(self, number: int) -> str:
         """See `Cases`."""
-        return str(self.pairs.case[number])
+        pairs = self.pairs if isinstance(self.pairs, Encounters) else self.pairs.part(number, number + 1).drawn()
+        return str(pairs.case[number if pairs is self.pairs else 0])
 
     def part(self, first: int, last: int) -> Self:
         """See `Cases`."""
@@ -179,14 +190,16 @@ class PairCases(Cases):
         """See `Cases`."""
         return replace(self, pairs=self.pairs.take(rows))
 
-    def find(self, case: str) -> int:
+    def number(self, case: str) -> int | None:
         """See `Cases`."""
+        if isinstance(self.pairs, RandomStates):
+            return self.pairs.find(case)
         found = np.flatnonzero(self.pairs.case == case)
-        return int(found[0]) if len(found) else super().find(case)
+        return int(found[0]) if len(found) else None
 
     def cycles(self, rules: Rules) -> FloatArray:
         """See `Cases`."""
-        return expected_cycles(self.pairs, rules)
+        return expected_cycles(self.encounters, rules)
 
     def digest(self, ramp: Ramp) -> str:
         """See `Cases`."""
@@ -307,6 +320,7 @@ class TrafficCases(Cases):
         first, last: The scenes `first` to `last - 1`.
     """
 
+    scenes: ClassVar[bool] = True
     most: ClassVar[int] = 1
     traffic: Traffic | Routes
     first: int
@@ -332,9 +346,10 @@ class TrafficCases(Cases):
         """See `Cases`; the scenes must follow each other."""
         return self.part(int(rows[0]), int(rows[-1]) + 1)
 
-    def find(self, case: str) -> int:
+    def number(self, case: str) -> int | None:
         """See `Cases`; `SCENE` or `SCENE/HOST/MERGING`."""
-        return super().find(case.partition("/")[0])
+        scene = case.partition("/")[0]
+        return next((number for number in range(len(self)) if self.name(number) == scene), None)
 
     def cycles(self, rules: Rules) -> FloatArray:
         """See `Cases`; once per car that is usually there."""

@@ -44,10 +44,9 @@ class Chunk:
 def cut(tasks: Sequence[Task], most: int | None = None) -> Iterator[Chunk]:
     """Cut tasks into chunks of at most `most` cases (None: each task's own), as even as can be."""
     for number, task in enumerate(tasks):
-        cycles = np.concatenate([[0.0], np.cumsum(task.cycles())])
         ends = np.linspace(0, len(task), -(-len(task) // (most or task.most)) + 1).astype(np.int64)
         for chunk, (first, last) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)):
-            yield Chunk(f"{number:04d}-{chunk:05d}", task, first, last, float(cycles[last] - cycles[first]))
+            yield Chunk(f"{number:04d}-{chunk:05d}", task, first, last, float(task.part(first, last).cycles().sum()))
 
 
 class ChunkQueue:

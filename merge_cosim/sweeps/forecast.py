@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from merge_cosim.scenarios.sources import Traffic
 from merge_cosim.sweeps.cases import LoggedCases
+from merge_cosim.sweeps.chunks import cut
 from merge_cosim.sweeps.task import Task
 
 PAIR_US = {"sumo": 8.0, "closed-form": 1.0}
@@ -26,7 +27,7 @@ def seconds(tasks: Sequence[Task], jobs: int) -> float:
 
 def forecast(tasks: Sequence[Task], jobs: int) -> str:
     """Say how many runs the tasks are and, beyond a minute, about how long they take."""
-    scenes = sum(len(task) for task in tasks if task.cases.encounters is None)
+    scenes = sum(len(task) for task in tasks if task.cases.scenes)
     pairs = sum(map(len, tasks)) - scenes
     counts = " and ".join(f"{count:,} {name}" for count, name in ((pairs, "cases"), (scenes, "scenes")) if count)
     parts = [
@@ -50,8 +51,8 @@ def duration(estimate: float) -> str:
 
 
 def _seconds(task: Task) -> float:
-    cycles = float(task.cycles().sum())
-    if task.cases.encounters is None:
+    cycles = sum(chunk.cycles for chunk in cut([task]))
+    if task.cases.scenes:
         source = task.scenario.encounters
         cars = USUAL_CARS
         if isinstance(source, Traffic):

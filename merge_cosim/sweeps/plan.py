@@ -27,9 +27,11 @@ from merge_cosim.scenarios.methods import (
     methods_for,
     refuse_unused,
 )
+from merge_cosim.scenarios.random_states import SOURCE as RANDOM
+from merge_cosim.scenarios.random_states import RandomStates
 from merge_cosim.scenarios.scenario import Scenario, load_scenario
 from merge_cosim.scenarios.settings import split_settings
-from merge_cosim.scenarios.sources import Routes, Traffic
+from merge_cosim.scenarios.sources import Random, Routes, Traffic
 from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
 from merge_cosim.sumo.configuration import Configuration
@@ -141,6 +143,8 @@ def tasks_of(
     """
     if scenario.is_scene:
         return _traffic_tasks(scenario, variation, methods, request)
+    if given is None and isinstance(scenario.encounters, Random) and scenario.full_scene is None:
+        return _encounter_tasks(scenario, variation, methods, RandomStates.of(scenario.encounters), request)
     key = scenario.encounters_key if given is None else scenario.name
     if key not in loaded:
         found = load_encounters(scenario, request.data, request.source) if given is None else given
@@ -233,13 +237,18 @@ def _models(method: Method, source: str, request: SweepRequest) -> Sequence[Inte
 
 
 def _encounter_tasks(
-    scenario: Scenario, variation: str, methods: list[Method], encounters: Encounters, request: SweepRequest
+    scenario: Scenario,
+    variation: str,
+    methods: list[Method],
+    encounters: Encounters | RandomStates,
+    request: SweepRequest,
 ) -> Iterator[Task]:
-    encounters, left_out = _on_the_ramp(scenario, encounters)
-    for source in dict.fromkeys(encounters.source.tolist()):
-        chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
-        cases = _cases(scenario, chosen, source, request)
-        for method in methods_for(chosen, methods):
+    left_out: tuple[str, ...] = ()
+    if isinstance(encounters, Encounters) or not _all_on_the_ramp(scenario, encounters):
+        every = encounters if isinstance(encounters, Encounters) else encounters.drawn()
+        encounters, left_out = _on_the_ramp(scenario, every)
+    for source, cases in _by_source(scenario, encounters, request):
+        for method in methods_for(cases.part(0, 1).encounters if source == RANDOM else cases.encounters, methods):
             models = _models(method, source, request)
             for model in models:
                 tested = cases if model is None else _not_trained_on(scenario, cases, model, several=len(models) > 1)
@@ -254,11 +263,23 @@ def _encounter_tasks(
                 )
 
 
-def _cases(scenario: Scenario, encounters: Encounters, source: str, request: SweepRequest) -> PairCases:
-    """The encounters alone, or among the cars that were logged with them."""
-    if scenario.full_scene is None:
-        kind = ClosedFormCases if request.world == "closed-form" else PairCases
-        return kind(encounters, host=scenario.host)
+def _by_source(
+    scenario: Scenario, encounters: Encounters | RandomStates, request: SweepRequest
+) -> Iterator[tuple[str, PairCases]]:
+    """The cases of each source."""
+    kind = ClosedFormCases if request.world == "closed-form" else PairCases
+    if isinstance(encounters, RandomStates):
+        yield RANDOM, kind(encounters, host=scenario.host)
+        return
+    for source in dict.fromkeys(encounters.source.tolist()):
+        chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
+        alone = scenario.full_scene is None
+        yield source, kind(chosen, host=scenario.host) if alone else _in_scenes(scenario, chosen, source, request)
+
+
+def _in_scenes(scenario: Scenario, encounters: Encounters, source: str, request: SweepRequest) -> LoggedCases:
+    """The encounters among the cars that were logged with them."""
+    assert scenario.full_scene is not None
     if request.world == "closed-form":
         raise _needs_sumo(scenario, "full_scene")
     try:
@@ -271,6 +292,13 @@ def _needs_sumo(scenario: Scenario, why: str) -> UserError:
     return UserError(
         f"scenario {scenario.name}: {why} needs SUMO to move the other cars; leave out --world closed-form"
     )
+
+
+def _all_on_the_ramp(scenario: Scenario, states: RandomStates) -> bool:
+    """Whether the ramp has room for the whole range of random states."""
+    hosts = states.host_stations
+    stations = {scenario.host: hosts, scenario.other: np.full(2, states.states.merging_station)}
+    return bool(Ramp.load(scenario.ramp).holds(np.zeros(2), stations["main"], stations["ramp"]).all())
 
 
 def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:
@@ -308,14 +336,14 @@ def default_model(source: str) -> str:
 
 def _not_trained_on(scenario: Scenario, cases: PairCases, model: IntentionModel, several: bool) -> PairCases:
     """The cases whose merging cars a model was not trained on, where it is one of several; else all, or a refusal."""
-    if not scenario.is_replay or model.source != str(cases.pairs.source[0]):
+    if not scenario.is_replay or model.source != str(cases.encounters.source[0]):
         return cases
-    trained = np.isin(cases.pairs.car, model.trained_on)
+    trained = np.isin(cases.encounters.car, model.trained_on)
     if not trained.any():
         return cases
     if several and not trained.all():
         return cases.take(np.flatnonzero(~trained))
-    known = sorted(set(cases.pairs.car[trained].tolist()))
+    known = sorted(set(cases.encounters.car[trained].tolist()))
     raise UserError(
         f"scenario {scenario.name}: model {model.name} was trained on {len(known)} of its merging cars "
         f"(such as {known[0]}); choose another --model or split"

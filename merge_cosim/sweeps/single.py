@@ -133,7 +133,7 @@ def export_commonroad(request: SweepRequest, case: str, out: Path) -> Path:
 
     need_library()
     tasks = plan(request)
-    if tasks[0].cases.encounters is None:
+    if tasks[0].cases.scenes:
         raise UserError(f"scenario {tasks[0].scenario.name}: --commonroad writes encounters of two cars, not scenes")
     task = case_alone(tasks, case)
     number = 1 + tasks[0].cases.find(case)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -41,16 +41,19 @@ def time_single_cases(
     records = [_NO_RECORDS]
     worker_session = WorkerSession(tiles=1)
     for task in tasks:
-        if task.variation or task.cases.encounters is None:
+        if task.variation or task.cases.scenes:
             continue
         scenario = task.scenario.name
         if scenario not in illustrative:
             illustrative[scenario] = _illustrative_case(
-                results.rows_of(scenario, "", ["case", "method", "failed", "distance_m"]).to_pandas()
+                batch.to_pandas() for batch in results.batches(scenario, "", ["method", "failed", "distance_m"])
             )
-        order = np.argsort(task.cases.encounters.case != illustrative[scenario], kind="stable")[:SINGLE_CASES]
-        name = str(task.cases.encounters.case[order[0]])
-        for run, _ in task.take(order).runs(worker_session, traced={name}):
+        number = task.cases.number(illustrative[scenario])
+        shown = [] if number is None else [number]
+        others = [row for row in range(min(len(task), SINGLE_CASES)) if row != number]
+        rows = np.array([*shown, *others][:SINGLE_CASES])
+        name = task.case(int(rows[0]))
+        for run, _ in task.take(rows).runs(worker_session, traced={name}):
             efforts.setdefault(task.method.name, Effort()).add(run.effort)
             records.append(run.traces[name].assign(scenario=scenario, case=name, method=task.method.name))
     worker_session.close()
@@ -58,14 +61,21 @@ def time_single_cases(
     return times, pa.Table.from_pandas(pd.concat(records), preserve_index=False)
 
 
-def _illustrative_case(rows: pd.DataFrame) -> str:
+def _illustrative_case(batches: Iterable[pd.DataFrame]) -> str:
     """The case on which the methods differ most: in failing, then in where they are when the host arrives.
 
     References do not count, unless there is nothing else.
     """
-    methods = rows[~rows["method"].map(is_reference)]
-    by_case = (methods if len(methods) else rows).groupby("case")
-    failing = by_case["failed"].mean()
-    spread = by_case["distance_m"].max() - by_case["distance_m"].min()
-    order = pd.DataFrame({"split": failing * (1 - failing), "spread": spread.fillna(0.0)})
-    return str(order.sort_values(["split", "spread"], ascending=False, kind="stable").index[0])
+    best: tuple[tuple[float, float], str] | None = None
+    for rows in batches:
+        methods = rows[~rows["method"].isin([name for name in rows["method"].unique() if is_reference(name)])]
+        by_case = (methods if len(methods) else rows).groupby("case")
+        failing = by_case["failed"].mean()
+        spread = by_case["distance_m"].max() - by_case["distance_m"].min()
+        order = pd.DataFrame({"split": failing * (1 - failing), "spread": spread.fillna(0.0)})
+        first = order.sort_values(["split", "spread"], ascending=False, kind="stable").iloc[0]
+        differ = float(first["split"]), float(first["spread"])
+        if best is None or differ > best[0]:
+            best = differ, str(first.name)
+    assert best is not None  # a task has cases, and a case has rows
+    return best[1]

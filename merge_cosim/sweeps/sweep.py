@@ -10,11 +10,14 @@ from typing import Any
 
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.results.statistics import belief, calibration, oracle_best, strata, summarise
+from merge_cosim.results.statistics import Summary, belief, calibration, oracle_best
+from merge_cosim.results.statistics.belief import COLUMNS as BELIEF_COLUMNS
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.results.statistics.ensemble import ensemble, rivals
+from merge_cosim.results.statistics.summary import COLUMNS
 from merge_cosim.results.statistics.traffic import scene_tables
 from merge_cosim.results.store import (
     BELIEF_CSV,
@@ -212,11 +215,14 @@ def _sum_up(
     }
     parts: dict[str, list[pd.DataFrame]] = {name: [] for name in (SUMMARY_CSV, STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV)}
     for group in folder.groups():
-        rows = folder.rows_of(*group).to_pandas()
-        parts[SUMMARY_CSV].append(summarise(rows, cycle_us, against))
-        parts[STRATA_CSV].append(strata(rows, against))
-        parts[BELIEF_CSV].append(belief(rows))
-        parts[CALIBRATION_CSV].append(calibration(rows))
+        sums = Summary(folder.count(*group), against)
+        for batch in folder.batches(*group, COLUMNS):
+            sums.add(batch.to_pandas())
+        parts[SUMMARY_CSV].append(sums.table(cycle_us))
+        parts[STRATA_CSV].append(sums.strata())
+        labelled = _labelled(folder, *group)
+        parts[BELIEF_CSV].append(belief(labelled))
+        parts[CALIBRATION_CSV].append(calibration(labelled))
     tables = {name: pd.concat(found, ignore_index=True) if found else pd.DataFrame() for name, found in parts.items()}
     tables |= scene_tables(scenes)
     if len(tables[SUMMARY_CSV]):
@@ -227,3 +233,9 @@ def _sum_up(
             table.to_csv(folder.path / name, index=False)
     summary = tables[SUMMARY_CSV]
     folder.write_json(SUMMARY_JSON, summary.astype(object).where(summary.notna(), None).to_dict("records"))
+
+
+def _labelled(folder: ResultFolder, scenario: str, variation: str) -> pd.DataFrame:
+    """The rows of one scenario and variation whose cases have a label, with what beliefs are judged by."""
+    batches = folder.batches(scenario, variation, BELIEF_COLUMNS)
+    return pa.concat_tables(rows.filter(pc.not_equal(rows["label"], "")) for rows in batches).to_pandas()

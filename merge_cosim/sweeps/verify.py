@@ -108,7 +108,7 @@ def verify(
     stored: list[pd.DataFrame] = []
     rng = np.random.default_rng(seed)
     for task, of_task in _tasks(rows, manifest, request, folder):
-        some = _some_scenes if task.cases.encounters is None else _some_pairs
+        some = _some_scenes if task.cases.scenes else _some_pairs
         parts, expected = some(task, of_task, share, rng)
         tasks += parts
         stored.append(expected)
@@ -140,8 +140,8 @@ def _tasks(
         one_model = replace(request, model=request.model or (models[0] if len(models) == 1 else None))
         wanted = set(zip(group["source"], group["model"], strict=True))
         for task in tasks_of(scenario, variation, [own], one_model, loaded):
-            pairs, model = task.cases.encounters, task.names["model"]
-            source = TRAFFIC if pairs is None else str(pairs.source[0])
+            first, model = task.part(0, 1).cases.encounters, task.names["model"]
+            source = TRAFFIC if first is None else str(first.source[0])
             if (source, model) not in wanted:
                 continue
             if task.model and digest(task.model.to_json().encode()) != manifest["models"].get(model):

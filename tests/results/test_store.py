@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import pandas as pd
 import pyarrow as pa
 import pytest
 from test_summaries import frame
@@ -25,9 +26,12 @@ def pieces():
                 yield f"{scenario}{method}-{number}", table
 
 
-@pytest.mark.parametrize("rows_at_a_time", [1, 5, 12, 100_000])
-def test_rows_are_in_order_and_cases_whole_whatever_a_stretch_is(tmp_path, monkeypatch, rows_at_a_time):
+@pytest.mark.parametrize(("rows_at_a_time", "part", "files"), [(1, 20, 5), (5, 42, 2), (12, 90, 0), (100_000, 1, 2)])
+def test_rows_are_in_order_and_cases_whole_whatever_a_stretch_is(tmp_path, monkeypatch, rows_at_a_time, part, files):
     monkeypatch.setattr(store, "STRETCH_ROWS", rows_at_a_time)
+    monkeypatch.setattr(store, "BATCH_ROWS", rows_at_a_time)
+    monkeypatch.setattr(store, "PART_ROWS", part)
+    (tmp_path / store.RESULTS).mkdir()  # of a larger sweep before
     folder = ResultFolder(tmp_path)
     folder.begin({}, resume=False)
     for name, rows in pieces():
@@ -43,11 +47,17 @@ def test_rows_are_in_order_and_cases_whole_whatever_a_stretch_is(tmp_path, monke
         return pa.Table.from_pandas(made, schema=SCHEMA, preserve_index=False)
 
     folder.merge(more)
-    groups, of_t = folder.groups(), folder.rows_of("t", "")
+    groups, of_t = folder.groups(), list(folder.batches("t", "", ["method"]))
     folder.finish()
     rows = folder.results()
     assert rows.num_rows == 2 * 3 * 15
     assert rows.equals(rows.sort_by(KEY))
     assert (len(stretches) > 2) == (rows_at_a_time < 15)
     assert groups == [("s", ""), ("t", "")]
-    assert of_t.num_rows == 45
+    assert (len(of_t) > 2) == (rows_at_a_time < 15)
+    assert [name for batch in of_t for name in batch["case"].to_pylist()] == [f"c{i // 3:02d}" for i in range(45)]
+    assert folder.count("t", "") == 45
+    assert all(len(set(batch["method"].to_pylist()[-3:])) == 3 for batch in of_t), "a case was cut"
+    written = tmp_path / store.RESULTS
+    assert len(list(written.glob("part-*.parquet"))) == files
+    assert pd.read_parquet(written)["case"].tolist() == rows["case"].to_pylist()

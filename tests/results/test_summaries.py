@@ -3,12 +3,13 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pytest
 
 from merge_cosim.results.schema import SCHEMA
-from merge_cosim.results.statistics import oracle_best, summarise
+from merge_cosim.results.statistics import Summary, oracle_best, rates, summarise, totals
 
 BASE = dict.fromkeys(SCHEMA.names) | {
     "scenario": "s",
@@ -135,3 +136,36 @@ def test_every_column_is_defined_on_the_page_of_measures():
     summary = summarise(frame({"case": "a", "method": "m"}), {})
     columns = {re.sub(r"^(log_odds|arrival_lead)_\d+$", r"\1_G", name) for name in (*SCHEMA.names, *summary)}
     assert columns - set(re.findall(r"`(\w+)`", page)) == set()
+
+
+@pytest.mark.parametrize("most_clusters", [10_000, 100])
+def test_a_summary_of_batches_is_that_of_the_whole(monkeypatch, most_clusters):
+    monkeypatch.setattr(rates, "MOST_CLUSTERS", most_clusters)
+    monkeypatch.setattr(totals, "MOST_CLUSTERS", most_clusters)
+    rng = np.random.default_rng(3)
+    cases = [
+        {"case": f"c{i:04d}", "car": "", "source": "random", "ambiguity_s": rng.uniform(0, 5), "site": "designed"}
+        for i in range(400)
+    ]
+    rows = frame(
+        *(
+            case
+            | {"method": method, "failed": rng.random() < 0.3, "censored": rng.random() < 0.1}
+            | {"distance_m": rng.exponential(), "hardest_braking": rng.normal(), "host_first": bool(rng.random() < 0.5)}
+            | {"min_ttc_s": rng.exponential() if rng.random() < 0.8 else None}
+            for case in cases
+            for method in ("acc", "always-go", "pgm")
+        )
+    )
+    whole = Summary(len(rows), "pgm").add(rows)
+    batches = Summary(len(rows), "pgm")
+    for first in range(0, len(rows), 150):
+        batches.add(rows.iloc[first : first + 150])
+    times = {"acc": (1.0, 2.0)}
+    pd.testing.assert_frame_equal(batches.table(times), whole.table(times), atol=1e-6)
+    pd.testing.assert_frame_equal(batches.strata(), whole.strata(), atol=1e-6)
+    acc = rows[rows["method"] == "acc"]
+    row = batches.table(times).set_index("method").loc["acc"]
+    assert row["min_ttc_s_p05"] == pytest.approx(acc["min_ttc_s"].quantile(0.05), abs=1e-6)
+    assert row["hardest_braking_p95"] == pytest.approx(acc["hardest_braking"].quantile(0.95), abs=1e-6)
+    assert row["distance_m"] == pytest.approx(acc["distance_m"].mean(), abs=1e-6)

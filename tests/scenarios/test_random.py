@@ -6,6 +6,7 @@ import pytest
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.scenarios.encounters import load_encounters
+from merge_cosim.scenarios.random_states import RandomStates
 from merge_cosim.scenarios.scenario import load_scenario
 
 
@@ -32,6 +33,20 @@ def test_fewer_cases_are_the_first_ones_and_another_seed_gives_others():
     assert few.case.tolist() == other.case.tolist()
 
 
+def test_a_stretch_is_the_same_whatever_it_is_drawn_from():
+    source = load_scenario("designed-random", {"encounters.count": 10_000_000}).encounters
+    every = RandomStates.of(source)
+    late = every.part(9_999_990, 10_000_000)
+    assert late.part(3, 5).drawn().digest == late.drawn().part(3, 5).digest
+    assert every.part(120, 130).drawn().digest == drawn(count=200).part(120, 130).digest
+    assert [every.find("r9999999"), late.find("r9999999"), late.find("r0000001"), every.find("x")] == [
+        9999999,
+        9,
+        None,
+        None,
+    ]
+
+
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
@@ -39,6 +54,7 @@ def test_fewer_cases_are_the_first_ones_and_another_seed_gives_others():
         ("host_speed", {"from": -1, "to": 5}, "a speed must not be negative"),
         ("merging_speed", {"from": 1, "to": float("inf")}, "to = inf"),
         ("count", 0, "count = 0"),
+        ("count", 10_000_001, "count = 10000001"),
         ("cout", 5, "did you mean 'count'"),
     ],
 )

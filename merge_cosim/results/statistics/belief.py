@@ -12,6 +12,13 @@ from merge_cosim.core.units import BoolArray, FloatArray
 from merge_cosim.results.statistics.summary import ALL_STARTS, GROUP, by_start, with_all_sites
 from merge_cosim.scoring.decisions import GATES
 
+COLUMNS = (
+    *GROUP,
+    "label",
+    "ambiguity_s",
+    *(f"{name}_{gate}" for gate in GATES for name in ("log_odds", "arrival_lead")),
+)
+"""Columns of result rows that these tables are made of."""
 BINS = 10
 """Bins of P(NOT_YIELD) by which calibration is judged."""
 

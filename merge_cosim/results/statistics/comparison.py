@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from merge_cosim.core.errors import UserError
@@ -38,17 +39,36 @@ def compare(own: pd.DataFrame, other: pd.DataFrame, against: str | None, is_samp
         against: Its name; None if there is none.
         is_sample: The cases are a sample, so that there is a p value; a fixed grid has counts alone.
     """
-    nothing = {"against": against, "only_this_fails": None, "only_other_fails": None, "mcnemar_p": None}
     if against is None or not len(other) or (own["method"] == against).all():
-        return nothing
+        return not_compared(against)
+    return judged(differing(own, other), against, is_sample)
+
+
+def not_compared(against: str | None) -> dict[str, Any]:
+    """What `compare` gives where there is nothing to compare with."""
+    return {"against": against, "only_this_fails": None, "only_other_fails": None, "mcnemar_p": None}
+
+
+def differing(own: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
+    """The common cases carried to the end by both on which one of two methods fails: `difference` (+1, -1), `cluster`.
+
+    Args:
+        own: Rows of one method, one per case.
+        other: Rows of the other.
+    """
     pairs = own[~own["censored"]].merge(other[~other["censored"]], on="case", suffixes=("", "_other"))
-    difference = pairs["failed"].astype(int) - pairs["failed_other"].astype(int)
-    p = sign_flip_p(difference.to_numpy(), clusters_of(pairs).to_numpy()) if is_sample else None
+    pairs = pairs[pairs["failed"] != pairs["failed_other"]]
+    return pd.DataFrame({"difference": np.where(pairs["failed"], 1, -1), "cluster": clusters_of(pairs)})
+
+
+def judged(cases: pd.DataFrame, against: str, is_sample: bool) -> dict[str, Any]:
+    """What `compare` gives, from the cases of `differing`."""
+    difference = cases["difference"]
     return {
         "against": against,
         "only_this_fails": int((difference > 0).sum()),
         "only_other_fails": int((difference < 0).sum()),
-        "mcnemar_p": p,
+        "mcnemar_p": sign_flip_p(difference.to_numpy(), cases["cluster"].to_numpy()) if is_sample else None,
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
@@ -41,12 +42,16 @@ def bootstrap_means(values: pd.DataFrame, clusters: pd.Series) -> list[Interval]
         clusters: Which rows belong together: those of one merging car. Single rows are the plain bootstrap.
     """
     numbers = values.astype(float)
-    sums = numbers.groupby(clusters.to_numpy()).sum()
-    counts = numbers.notna().groupby(clusters.to_numpy()).sum()
+    by = clusters.to_numpy()
+    return bootstrap_sums(numbers.groupby(by).sum(), numbers.notna().groupby(by).sum())
+
+
+def bootstrap_sums(sums: pd.DataFrame, counts: pd.DataFrame) -> list[Interval]:
+    """The same from the sum and the number of known values of each cluster, a row per cluster, ordered by it."""
     if len(sums) < 2:
-        return [(None, None)] * numbers.shape[1]
+        return [(None, None)] * sums.shape[1]
     if len(sums) > MOST_CLUSTERS:
-        return [_normal(sums[name].to_numpy(), counts[name].to_numpy()) for name in numbers]
+        return [Moments.of(sums[name].to_numpy(), counts[name].to_numpy()).interval() for name in sums]
     weights = _weights(len(sums))
     drawn = weights @ counts.to_numpy(dtype=float)
     means = np.divide(weights @ sums.to_numpy(), drawn, out=np.full_like(drawn, np.nan), where=drawn > 0)
@@ -58,14 +63,35 @@ def bootstrap_means(values: pd.DataFrame, clusters: pd.Series) -> list[Interval]
     return found
 
 
-def _normal(sums: FloatArray, counts: IntArray) -> Interval:
-    """Interval of the ratio of two totals over many clusters, from the spread of what each adds."""
-    n, total = len(sums), counts.sum()
-    if not total:
-        return None, None
-    ratio = sums.sum() / total
-    half = Z * np.sqrt(n / (n - 1) * np.sum((sums - ratio * counts) ** 2)) / total
-    return float(ratio - half), float(ratio + half)
+class Moments(NamedTuple):
+    """Sums over many clusters, of which s is the sum and c the number of known values of each."""
+
+    clusters: int
+    s: float
+    c: float
+    s_s: float
+    s_c: float
+    c_c: float
+
+    @classmethod
+    def of(cls, sums: FloatArray, counts: IntArray) -> Self:
+        """Of clusters, shape (n,) each."""
+        squares = (np.sum(one * other) for one, other in ((sums, sums), (sums, counts), (counts, counts)))
+        return cls(len(sums), float(sums.sum()), float(counts.sum()), *map(float, squares))
+
+    def __add__(self, other: tuple[Any, ...]) -> Self:
+        """Of the clusters of both."""
+        return type(self)(*(one + another for one, another in zip(self, other, strict=True)))
+
+    def interval(self) -> Interval:
+        """Interval of the ratio of the two totals, from the spread of what each cluster adds."""
+        n, total = self.clusters, self.c
+        if not total or n < 2:
+            return None, None
+        ratio = self.s / total
+        spread = max(self.s_s - 2 * ratio * self.s_c + ratio**2 * self.c_c, 0.0)
+        half = Z * np.sqrt(n / (n - 1) * spread) / total
+        return float(ratio - half), float(ratio + half)
 
 
 @lru_cache(maxsize=2)
@@ -79,21 +105,3 @@ def _weights(clusters: int) -> FloatArray:
 def percent(part: int, whole: int) -> float | None:
     """A share [%]."""
     return round(100 * part / whole, 4) if whole else None
-
-
-def mean(values: pd.Series, factor: float = 1.0) -> float | None:
-    """Mean of what is known, times a factor."""
-    present = values.dropna().astype(float)
-    return round(factor * float(present.mean()), 6) if len(present) else None
-
-
-def quantile(values: pd.Series, q: float) -> float | None:
-    """Quantile of what is known."""
-    present = values.dropna()
-    return round(float(present.quantile(q)), 6) if len(present) else None
-
-
-def count(values: pd.Series) -> int | None:
-    """How many of what is known are true."""
-    present = values.dropna()
-    return int(present.sum()) if len(present) else None

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 
 from merge_cosim.results.schema import SCHEMA
-from merge_cosim.results.statistics.comparison import compare
+from merge_cosim.results.statistics.comparison import differing, judged, not_compared
 from merge_cosim.results.statistics.paired import holm
-from merge_cosim.results.statistics.rates import bootstrap_means, count, mean, percent, quantile, wilson
+from merge_cosim.results.statistics.rates import percent, wilson
+from merge_cosim.results.statistics.totals import Sum, Tail, Totals
 from merge_cosim.scenarios.methods import CONSTANT, ORACLE_BEST
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
 
@@ -24,6 +25,33 @@ ALL_SITES = "all"
 AMBIGUITY_EDGES = (0.0, 1.0, 3.0, np.inf)
 """Strata of |T_m - T_h| at the start [s]."""
 ALL_STARTS = "all"
+MEANS = (
+    *("distance_m", "distance_m_safe", "gap_m", "delay_s", "hardest_braking", "mean_jerk", "decision_flips"),
+    *("first_stable_s", "human_station_rms_m", "human_speed_rms"),
+)
+"""Means that the summary has under the name of their column; of `distance_m_safe` and `first_stable_s` of some rows."""
+SUMMED = (
+    *("distance_m", "gap_m", "delay_s", "hardest_braking", "mean_jerk", "decision_flips", "human_station_rms_m"),
+    *("human_speed_rms", "host_first", "merging_stopped", "unnecessary_yield", "correct_at_merge", "order_swapped"),
+)
+QUANTILES = {
+    "hardest_braking_p95": ("hardest_braking", 0.95),
+    "min_ttc_s_p05": ("min_ttc_s", 0.05),
+    "max_drac_p95": ("max_drac", 0.95),
+    "pet_s_p05": ("pet_s", 0.05),
+    "min_leader_gap_m_p05": ("min_leader_gap_m", 0.05),
+    "min_leader_ttc_s_p05": ("min_leader_ttc_s", 0.05),
+    "min_follower_gap_m_p05": ("min_follower_gap_m", 0.05),
+}
+"""Quantiles of the summary: of which column, and which."""
+COLUMNS = (
+    *GROUP,
+    *("case", "car", "failed", "failure_kind", "censored", "stuck", "deadlock", "in_support", "extended"),
+    *("host_reached", "sumo_collision", "ambiguity_s", "first_stable_s"),
+    *(name for name in SUMMED if name != "unnecessary_yield"),
+    *dict.fromkeys(column for column, _ in QUANTILES.values() if column != "hardest_braking"),
+)
+"""Columns of result rows that a summary is made of."""
 D0 = 2.0
 """A host that lets the merging car pass without need kept at least this bumper gap [m] (d0 of the controller)."""
 
@@ -53,21 +81,17 @@ def summarise(
         cycle_us: For each method the time of one update per encounter in a full batch, and in a batch of one [us].
         against: Method that the others are compared with on the same cases; None for none.
     """
-    return _summaries(_with_yields(rows), cycle_us, against)
+    return Summary(len(rows), against).add(rows).table(cycle_us)
 
 
 def strata(rows: pd.DataFrame, against: str | None = None) -> pd.DataFrame:
     """The same for the cases of each ambiguity at the start, with the column `start`; variations are left out."""
-    frame = _with_yields(rows)
-    parts = by_start(frame[frame["variation"] == ""])
-    found = [_summaries(part, {}, against).assign(start=start) for start, part in parts if len(part)]
-    return pd.concat(found, ignore_index=True) if found else pd.DataFrame()
+    return Summary(len(rows), against).add(rows).strata()
 
 
 def by_start(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """Part rows by how ambiguous their cases begin."""
-    for low, high in pairwise(AMBIGUITY_EDGES):
-        name = f"[{low:g}, {high:g}) s" if np.isfinite(high) else f">= {low:g} s"
+    for name, (low, high) in zip(_starts(), pairwise(AMBIGUITY_EDGES), strict=True):
         yield name, frame[(frame["ambiguity_s"] >= low) & (frame["ambiguity_s"] < high)]
 
 
@@ -82,33 +106,84 @@ def with_all_sites(frame: pd.DataFrame) -> pd.DataFrame:
 
 def compare_all(rows: pd.DataFrame, against: str | None) -> dict[tuple[str, ...], dict[str, Any]]:
     """The comparison of every group (`GROUP`) with a method on the same cases."""
-    frame = with_all_sites(rows)
-    others = {tuple(map(str, key)): part for key, part in frame[frame["method"] == against].groupby(SECTION)}
-    found = {}
-    for names, group in frame.groupby(GROUP, sort=True):
-        key = tuple(map(str, names))
-        in_common = key[: len(SECTION)] if key[SECTION.index("source")] != TRAFFIC else ()
-        other = others.get(in_common, frame.iloc[:0])
-        same_model = other["model"] == key[GROUP.index("model")]
-        other = (other[same_model] if same_model.any() else other).drop_duplicates("case")
-        found[key] = compare(group, other, against, is_sample(group))
-    return found
+    return Summary(len(rows), against).add(rows).comparisons()
 
 
-def _summaries(
-    frame: pd.DataFrame, cycle_us: Mapping[str, tuple[float, float | None]], against: str | None
-) -> pd.DataFrame:
-    compared = compare_all(frame, against)
-    groups = with_all_sites(frame).groupby(GROUP, sort=True)
-    found = []
-    for names, group in groups:
-        key = tuple(map(str, names))
-        found.append(_summary(dict(zip(GROUP, key, strict=True)), group, cycle_us) | compared[key])
-    table = pd.DataFrame(found)
-    table["p_holm"] = np.nan
-    for _, section in table[table["mcnemar_p"].notna()].groupby(SECTION):
-        table.loc[section.index, "p_holm"] = holm(section["mcnemar_p"].tolist())
-    return table
+class Summary:
+    """Summary rows of result rows that come in batches of whole cases, of any number: no more than a batch is held."""
+
+    def __init__(self, most: int, against: str | None = None) -> None:
+        """Begin.
+
+        Args:
+            most: Most rows that there will be.
+            against: Method that the others are compared with on the same cases; None for none.
+        """
+        self._most, self._against = most, against
+        self._groups: dict[str, dict[tuple[str, ...], Totals]] = {}
+
+    def add(self, rows: pd.DataFrame) -> Self:
+        """Take in a batch: all rows of some cases, with the columns `COLUMNS` at least."""
+        frame = rows.assign(unnecessary_yield=_unnecessary_yields(rows))
+        others = dict(iter(frame[frame["method"] == self._against].groupby(SECTION)))
+        for names, group in frame.groupby(GROUP, sort=True):
+            key = tuple(map(str, names))
+            section = key[: len(SECTION)] if key[SECTION.index("source")] != TRAFFIC else ()
+            other = others.get(section, frame.iloc[:0])
+            same_model = other["model"] == key[GROUP.index("model")]
+            other = (other[same_model] if same_model.any() else other).drop_duplicates("case")
+            parts = [] if key[SECTION.index("variation")] else by_start(group)
+            for start, part in [(ALL_STARTS, group), *parts]:
+                if len(part):
+                    totals = self._groups.setdefault(start, {}).setdefault(key, Totals(self._most))
+                    _take_in(totals, part, other, self._against)
+        return self
+
+    def table(self, cycle_us: Mapping[str, tuple[float, float | None]]) -> pd.DataFrame:
+        """See `summarise`."""
+        return self._table(ALL_STARTS, cycle_us)
+
+    def strata(self) -> pd.DataFrame:
+        """See `strata`."""
+        starts = [start for start in _starts() if start in self._groups]
+        found = [self._table(start, {}).assign(start=start) for start in starts]
+        return pd.concat(found, ignore_index=True) if found else pd.DataFrame()
+
+    def comparisons(self) -> dict[tuple[str, ...], dict[str, Any]]:
+        """See `compare_all`."""
+        return {key: self._comparison(key, totals) for key, totals in self._with_all_sites(ALL_STARTS).items()}
+
+    def _table(self, start: str, cycle_us: Mapping[str, tuple[float, float | None]]) -> pd.DataFrame:
+        found = [
+            _summary(dict(zip(GROUP, key, strict=True)), totals, cycle_us) | self._comparison(key, totals)
+            for key, totals in self._with_all_sites(start).items()
+        ]
+        table = pd.DataFrame(found)
+        table["p_holm"] = np.nan
+        for _, section in table[table["mcnemar_p"].notna()].groupby(SECTION):
+            table.loc[section.index, "p_holm"] = holm(section["mcnemar_p"].tolist())
+        return table
+
+    def _comparison(self, key: tuple[str, ...], totals: Totals) -> dict[str, Any]:
+        if self._against is None or not totals.compared:
+            return not_compared(self._against)
+        sample = is_sample_source(key[GROUP.index("source")])
+        return judged(pd.concat(totals.differing, ignore_index=True), self._against, sample)
+
+    def _with_all_sites(self, start: str) -> dict[tuple[str, ...], Totals]:
+        """All groups in order, those of all sites together where a scenario has several of one source."""
+        groups = self._groups.get(start, {})
+        sites: dict[str, set[tuple[str, str]]] = {}
+        scenario, site, source = (GROUP.index(name) for name in ("scenario", "site", "source"))
+        for key in groups:
+            sites.setdefault(key[scenario], set()).add((key[site], key[source]))
+        every = dict(groups)
+        for key, totals in groups.items():
+            there = sites[key[scenario]]
+            if len({one for one, _ in there}) > 1 and len({one for _, one in there}) == 1:
+                joint = (*key[:site], ALL_SITES, *key[site + 1 :])
+                every.setdefault(joint, Totals(self._most)).join(totals)
+        return dict(sorted(every.items()))
 
 
 def is_sample(group: pd.DataFrame) -> bool:
@@ -116,18 +191,78 @@ def is_sample(group: pd.DataFrame) -> bool:
     return bool((group["source"] != "designed").all())
 
 
-def _summary(
-    key: dict[str, str], group: pd.DataFrame, cycle_us: Mapping[str, tuple[float, float | None]]
-) -> dict[str, Any]:
-    scored = group[~group["censored"]]
-    failures, n = int(scored["failed"].sum()), len(scored)
-    censored = len(group) - n
-    stuck = int(scored["stuck"].sum())
-    low, high = wilson(failures, n) if is_sample(group) else (None, None)
-    stuck_low, stuck_high = wilson(failures + stuck, n) if is_sample(group) else (None, None)
+def is_sample_source(source: str) -> bool:
+    """See `is_sample`."""
+    return source != "designed"
+
+
+def _starts() -> list[str]:
+    return [
+        f"[{low:g}, {high:g}) s" if np.isfinite(high) else f">= {low:g} s" for low, high in pairwise(AMBIGUITY_EDGES)
+    ]
+
+
+def _take_in(totals: Totals, group: pd.DataFrame, other: pd.DataFrame, against: str | None) -> None:
+    """Add the rows of a group to its totals.
+
+    Args:
+        totals: The totals.
+        group: The rows.
+        other: Rows of the method that it is compared with, on the same cases.
+        against: Name of that method.
+    """
+    failed, censored = group["failed"], group["censored"]
+    labelled, supported = group["correct_at_merge"].notna(), group["in_support"]
+    own = group["failure_kind"] != "merging_into_host"
+    for name, rows in (
+        ("rows", group["case"].notna()),
+        ("n", ~censored),
+        ("failures", failed & ~censored),
+        ("own", own & ~censored),
+        ("own_failures", own & failed & ~censored),
+        ("stuck", group["stuck"] & ~censored),
+        ("deadlocks", group["deadlock"].eq(True) & ~censored),
+        ("supported", supported.notna()),
+        ("outside_support", supported.eq(False)),
+        ("extended", group["extended"]),
+        ("host_not_reached", ~group["host_reached"]),
+        ("labelled", labelled),
+        ("first_stable", labelled & group["first_stable_s"].notna()),
+        ("sumo_disagrees", group["sumo_collision"] != failed),
+    ):
+        totals.numbers[name] += int(rows.sum())
+    for name in SUMMED:
+        totals.sums.setdefault(name, Sum()).add(group[name])
+    totals.sums.setdefault("distance_m_safe", Sum()).add(group.loc[~failed, "distance_m"])
+    totals.sums.setdefault("first_stable_s", Sum()).add(group.loc[labelled, "first_stable_s"])
+    for name, (column, q) in QUANTILES.items():
+        values = group[column].to_numpy(dtype=float, na_value=np.nan)
+        totals.tails.setdefault(name, Tail(min(q, 1 - q))).add(values if q < 0.5 else -values, totals.most)
+    if is_sample(group):
+        logged = group["car"] != ""
+        both = pd.DataFrame(
+            {"failed": (100.0 * failed).where(~censored), "distance": group["distance_m"]}, index=group.index
+        )
+        totals.logged &= bool(logged.all())
+        totals.clusters.add(both, group["car"] if logged.all() else group["case"], whole=not logged.any())
+    if against is not None and len(other) and not (group["method"] == against).all():
+        totals.compared = True
+        totals.differing.append(differing(group, other))
+
+
+def _summary(key: dict[str, str], totals: Totals, cycle_us: Mapping[str, tuple[float, float | None]]) -> dict[str, Any]:
+    numbers, sums = totals.numbers, totals.sums
+    rows, n, failures, stuck = (numbers[name] for name in ("rows", "n", "failures", "stuck"))
+    censored = rows - n
+    sample = is_sample_source(key["source"])
+    low, high = wilson(failures, n) if sample else (None, None)
+    stuck_low, stuck_high = wilson(failures + stuck, n) if sample else (None, None)
     batch_us, single_us = cycle_us.get(key["method"], (None, None))
-    own = scored[scored["failure_kind"] != "merging_into_host"]
-    labelled = group[group["correct_at_merge"].notna()]
+    quantiles = {
+        name: round(tail.value() if QUANTILES[name][1] < 0.5 else -tail.value(), 6) if tail.known else None
+        for name, tail in totals.tails.items()
+    }
+    means = {name: sums[name].mean() for name in MEANS}
     return {
         **key,
         "n": n,
@@ -135,69 +270,53 @@ def _summary(
         "failure_pct": percent(failures, n),
         "ci_low_pct": low,
         "ci_high_pct": high,
-        **_intervals(group),
-        "failure_pct_own": percent(int(own["failed"].sum()), len(own)),
+        **_intervals(totals, sample),
+        "failure_pct_own": percent(numbers["own_failures"], numbers["own"]),
         "censored": censored,
-        "failure_pct_best": percent(failures, len(group)),
-        "failure_pct_worst": percent(failures + censored, len(group)),
+        "failure_pct_best": percent(failures, rows),
+        "failure_pct_worst": percent(failures + censored, rows),
         "stuck": stuck,
-        "deadlocks": int(scored["deadlock"].sum()),
-        "outside_support": None if group["in_support"].isna().all() else int((~group["in_support"].astype(bool)).sum()),
+        "deadlocks": numbers["deadlocks"],
+        "outside_support": numbers["outside_support"] if numbers["supported"] else None,
         "failed_or_stuck_pct": percent(failures + stuck, n),
         "failed_or_stuck_low_pct": stuck_low,
         "failed_or_stuck_high_pct": stuck_high,
-        "failed_or_stuck_pct_worst": percent(failures + stuck + censored, len(group)),
-        "extended": int(group["extended"].sum()),
-        "host_not_reached": int((~group["host_reached"]).sum()),
-        "host_first_pct": mean(group["host_first"], 100),
-        "distance_m": mean(group["distance_m"]),
-        "distance_m_safe": mean(group.loc[~group["failed"], "distance_m"]),
-        "gap_m": mean(group["gap_m"]),
-        "delay_s": mean(group["delay_s"]),
-        "hardest_braking": mean(group["hardest_braking"]),
-        "hardest_braking_p95": quantile(group["hardest_braking"], 0.95),
-        "mean_jerk": mean(group["mean_jerk"]),
-        "min_ttc_s_p05": quantile(group["min_ttc_s"], 0.05),
-        "max_drac_p95": quantile(group["max_drac"], 0.95),
-        "pet_s_p05": quantile(group["pet_s"], 0.05),
-        "min_leader_gap_m_p05": quantile(group["min_leader_gap_m"], 0.05),
-        "min_leader_ttc_s_p05": quantile(group["min_leader_ttc_s"], 0.05),
-        "min_follower_gap_m_p05": quantile(group["min_follower_gap_m"], 0.05),
-        "merging_stopped": count(group["merging_stopped"]),
-        "unnecessary_yields": count(group["unnecessary_yield"]),
-        "labelled": len(labelled),
-        "decision_flips": mean(group["decision_flips"]),
-        "correct_at_merge_pct": mean(group["correct_at_merge"], 100),
-        "first_stable_pct": percent(int(labelled["first_stable_s"].notna().sum()), len(labelled)),
-        "first_stable_s": mean(labelled["first_stable_s"]),
-        "order_swapped": count(group["order_swapped"]),
-        "human_station_rms_m": mean(group["human_station_rms_m"]),
-        "human_speed_rms": mean(group["human_speed_rms"]),
-        "sumo_disagrees": int((group["sumo_collision"] != group["failed"]).sum()),
+        "failed_or_stuck_pct_worst": percent(failures + stuck + censored, rows),
+        "extended": numbers["extended"],
+        "host_not_reached": numbers["host_not_reached"],
+        "host_first_pct": sums["host_first"].mean(100),
+        **{name: means[name] for name in MEANS[:5]},
+        "hardest_braking_p95": quantiles["hardest_braking_p95"],
+        "mean_jerk": means["mean_jerk"],
+        **{name: quantiles[name] for name in QUANTILES if name != "hardest_braking_p95"},
+        "merging_stopped": sums["merging_stopped"].count(),
+        "unnecessary_yields": sums["unnecessary_yield"].count(),
+        "labelled": numbers["labelled"],
+        "decision_flips": means["decision_flips"],
+        "correct_at_merge_pct": sums["correct_at_merge"].mean(100),
+        "first_stable_pct": percent(numbers["first_stable"], numbers["labelled"]),
+        "first_stable_s": means["first_stable_s"],
+        "order_swapped": sums["order_swapped"].count(),
+        "human_station_rms_m": means["human_station_rms_m"],
+        "human_speed_rms": means["human_speed_rms"],
+        "sumo_disagrees": numbers["sumo_disagrees"],
         "cycle_us": None if batch_us is None else round(batch_us, 3),
         "cycle_us_single": None if single_us is None else round(single_us, 3),
     }
 
 
-def _intervals(group: pd.DataFrame) -> dict[str, Any]:
+def _intervals(totals: Totals, sample: bool) -> dict[str, Any]:
     """Bootstrap intervals over merging cars: of the failure rate where a car has several cases, and of D."""
     names = ("cluster_low_pct", "cluster_high_pct", "distance_low_m", "distance_high_m")
-    if not is_sample(group):
+    if not sample:
         return {"cars": None, **dict.fromkeys(names)}
-    logged = bool((group["car"] != "").all())
-    clusters = group["car"] if logged else group["case"]
-    several = clusters.nunique() < len(group)
-    failed = (100.0 * group["failed"]).where(~group["censored"])
-    values = pd.DataFrame({"failed": failed, "distance": group["distance_m"]})
-    rate, distance = bootstrap_means(values, clusters)
-    if not several:
+    clusters = totals.clusters
+    cars = clusters.number
+    rate, distance = clusters.intervals()
+    if cars == clusters.rows:
         rate = (None, None)
     ends = (None if end is None else round(end, 4) for end in (*rate, *distance))
-    return {"cars": clusters.nunique() if logged else None, **dict(zip(names, ends, strict=True))}
-
-
-def _with_yields(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.assign(unnecessary_yield=_unnecessary_yields(rows))
+    return {"cars": cars if totals.logged else None, **dict(zip(names, ends, strict=True))}
 
 
 def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
@@ -206,6 +325,8 @@ def _unnecessary_yields(frame: pd.DataFrame) -> pd.Series:
     Missing where always-go was not run.
     """
     go = frame[(frame["method"] == "always-go") & (frame["source"] != TRAFFIC)].drop_duplicates(CASE)
+    if not len(go):
+        return pd.Series(pd.NA, frame.index, dtype="boolean")
     possible = go["host_first"].eq(True) & ~go["failed"] & (go["gap_m"].fillna(np.inf) >= D0)
     known = frame[CASE].merge(go[CASE].assign(possible=possible.astype("boolean")), how="left", on=CASE)["possible"]
     known = known.set_axis(frame.index)

@@ -1,0 +1,84 @@
+"""Random initial states that are drawn only where they are needed: ten million of them take no room."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from merge_cosim.core.encounter import Encounters
+from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.scenarios.sources import Random
+
+SOURCE = "random"
+
+
+@dataclass(frozen=True)
+class RandomStates:
+    """A stretch of the cases of a random source.
+
+    Attributes:
+        states: The source.
+        first, last: The cases `first` to `last - 1`.
+    """
+
+    states: Random
+    first: int
+    last: int
+
+    @classmethod
+    def of(cls, states: Random) -> Self:
+        """All cases of a source."""
+        return cls(states, 0, states.count)
+
+    def __len__(self) -> int:
+        return self.last - self.first
+
+    def part(self, first: int, last: int) -> Self:
+        """The cases `first` to `last - 1` of these."""
+        return replace(self, first=self.first + first, last=self.first + last)
+
+    def take(self, rows: IntArray) -> Encounters:
+        """The chosen cases, in that order."""
+        return self.drawn().take(rows)
+
+    def find(self, case: str) -> int | None:
+        """Number of a case by its name; None if it is not among these."""
+        named = re.fullmatch(r"r(\d{7})", case)
+        number = int(named[1]) - self.first if named else -1
+        return number if 0 <= number < len(self) else None
+
+    @property
+    def host_stations(self) -> FloatArray:
+        """The ends of the range of the hosts' initial stations [m], shape (2,)."""
+        offset = self.states.host_offset
+        return self.states.merging_station + np.array([offset.first, offset.last])
+
+    @property
+    def digest(self) -> str:
+        """A short hash of what they are drawn from."""
+        return hashlib.sha256(f"{self.states!r} {self.first} {self.last}".encode()).hexdigest()[:16]
+
+    def drawn(self) -> Encounters:
+        """The cases; each is the same whichever stretch it is drawn in, and however many there are in all."""
+        states = self.states
+        spans = (states.host_offset, states.host_speed, states.merging_speed)
+        low, width = np.array([(span.first, span.last - span.first) for span in spans]).T
+        bits = np.random.PCG64(states.seed)
+        bits.advance(len(spans) * self.first)  # of which each number takes one
+        shares = np.random.Generator(bits).random((len(self), len(spans)))
+        offset, host_speed, merging_speed = (low + width * shares).T.copy()
+        return Encounters.unlogged(
+            np.array([f"r{number:07d}" for number in range(self.first, self.last)]),
+            "designed",
+            SOURCE,
+            host_station=states.merging_station + offset,
+            host_speed=host_speed,
+            host_length=states.length,
+            merging_station=states.merging_station,
+            merging_speed=merging_speed,
+            merging_length=states.length,
+        )
