@@ -2,8 +2,9 @@
 
     python tools/ranking_page.py
 
-sweeps Designed Test II in closed form for every combination of speed limit, car length and meaning of 'ahead', and
-every estimator under every controller; draws a heat map per method and counts where the published order appears.
+sweeps Designed Test II in closed form for every combination of speed limit, car length and meaning of 'ahead', for
+several weights of iPCB's planner and several training sets, and every estimator under every controller; draws heat maps
+of every method and counts where the published order appears.
 """
 
 import textwrap
@@ -20,41 +21,51 @@ from scipy.stats import kendalltau
 import merge_cosim as mc
 from merge_cosim.report.published import PUBLISHED
 
-METHODS = ("acc", "slot", "ipcb", "pgm-g", "pgm", "pgm-symmetric")
-COMPETITORS = METHODS[:-1]
-"""The methods whose failure rates in Designed Test II were published."""
 RULES = ("acc", "slot", "ipcb")
+LEARNED = ("pgm-g", "pgm", "pgm-symmetric")
+COMPETITORS = (*RULES, *LEARNED[:-1])
+"""The methods whose failure rates in Designed Test II were published."""
+WEIGHTS = (10.0, 1.0, 0.0)
+"""Weights of closeness in iPCB's planner; first the default."""
+MODELS = ("us101-ngsim-all", "us101-ngsim", "us101-surrogate")
+"""The project's own models: trained on all real cars (the default), on a third of them, on the surrogate."""
 LIMITS = (12.0, 16.0, 20.0, 29.0)
 LENGTHS = (4.0, 5.0, 7.0)
 AHEAD = ("clear", "in-lane", "any")
 ESTIMATORS = ("slot", "slot-time", "pgm", "pgm-symmetric", "pgm-g", "fg", "fg-gmm", "dbn-pf", "ipcb")
 CONTROLLERS = ("acc", "lqr", "pcb", "rollout")
-PICTURE = "img/ranking.png"
+SETTING = ["ahead", "speed_limit", "length"]
+OWN = ["weight", "model"]
+PICTURES = {"img/ranking.png": RULES, "img/ranking-learned.png": LEARNED}
 TEXT = """\
 # What decides the order of the methods
 
 {conclusion}
 
-Made by `python tools/ranking_page.py`: Designed Test II in closed form, host's offset in steps of {step} m (n = {n} per
-setting and method), model `us101-ngsim-all`. {settings} settings were tried, and all of them are shown: speed limit
-{limits} m/s x length of both cars {lengths} m x meaning of 'the host is ahead' for the designed
-merging car ({ahead}). The papers state none of the three. No default of the project was chosen
-from this page.
+Made by `python tools/ranking_page.py`: Designed Test II in closed form, host's offset in steps of {step} m, both
+speeds in steps of {step} m/s (n = {n} per setting and method). {settings} settings were tried,
+and all of them are shown: speed limit {limits} m/s x length of both cars {lengths} m x meaning of
+'the host is ahead' for the designed merging car ({ahead}) x weight of closeness
+in iPCB's planner {weights} x training set ({models}; see [models](models.md)).
+The papers state none of the five. No default of the project was chosen from this page.
 
 ## Failures over the open choices
 
-![Failure rate of each method over speed limit and car length]({picture})
+![Failure rates of the methods that learn nothing](img/ranking.png)
 
-Failures in per cent; bold: the default. A row of maps per meaning of 'ahead', a column per method, all of one scale.
+![Failure rates of the methods that learn](img/ranking-learned.png)
+
+Failures in per cent; bold: the default. A row of maps per meaning of 'ahead', a column per method and choice of its own
+(iPCB's weight, the model of the learned methods), all of one scale.
 
 Kendall's tau compares the order of the {competitors} methods whose rates were published with the published order (1:
-the same, -1: reversed).
+the same, -1: reversed). A column per weight of closeness and training set:
 
 {orders}
 ## Estimators and controllers apart
 
 Failures and, in brackets, hosts that never arrived, in per cent, with the scenario's defaults. Down: the estimator;
-across: the controller that drives on its estimate.
+across: the controller that drives on its estimate. Model `us101-ngsim-all`.
 
 {apart}
 {apart_words}
@@ -64,32 +75,38 @@ across: the controller that drives on its estimate.
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the sweeps and write the page and its picture."""
     given = page_parser(__doc__).parse_args(argv)
-    step = 5 if given.short else 2
+    step = 8 if given.short else 2
     limits, lengths, ahead = (LIMITS[::3], LENGTHS[:2], AHEAD[:1]) if given.short else (LIMITS, LENGTHS, AHEAD)
-    grid = {"encounters.host_offset.step": step} | (
-        {"encounters.host_speed.step": 8, "encounters.merging_speed.step": 8} if given.short else {}
-    )
+    grid: dict[str, object] = {
+        f"encounters.{axis}.step": step for axis in ("host_offset", "host_speed", "merging_speed")
+    }
+    weights, models = (WEIGHTS[:2], MODELS[:2]) if given.short else (WEIGHTS, MODELS)
     parts = []
     for setting in product(ahead, limits, lengths):
         choice = dict(zip(("merging.ahead", "speed_limit", "encounters.length"), setting, strict=True))
-        parts.append(swept(METHODS, grid | choice).assign(**{name.rpartition(".")[2]: v for name, v in choice.items()}))
+        found = [swept(RULES[:-1], grid | choice)]
+        found += [swept(RULES[-1:], grid | choice | {"pcb.closeness": w}).assign(weight=w) for w in weights]
+        found += [swept(LEARNED, grid | choice, model).assign(model=model) for model in models]
+        parts.append(pd.concat(found).assign(**dict(zip(SETTING, setting, strict=True))))
     rows = pd.concat(parts)
     published = {method: PUBLISHED["designed-2"][method].failure_pct for method in COMPETITORS}
-    orders = taus(rows, published)
-    draw(rows, given.docs / PICTURE)
+    orders = taus(rows, published, weights, models)
+    for picture, methods in PICTURES.items():
+        draw(rows[rows["method"].isin(methods)], given.docs / picture)
     controllers = CONTROLLERS[:2] if given.short else CONTROLLERS
     estimators = ESTIMATORS[:2] if given.short else ESTIMATORS
     pairs = [f"{estimator}+{controller}" for estimator in estimators for controller in controllers]
     apart = swept(pairs, grid).set_index("method")
     text = TEXT.format(
-        conclusion=conclusion(rows, orders, published),
+        conclusion=conclusion(orders, published),
         step=step,
         n=f"{int(rows['n'].max()):,}",
         settings=len(orders),
         limits=", ".join(f"{v:g}" for v in limits),
         lengths=", ".join(f"{v:g}" for v in lengths),
         ahead=", ".join(f"`{v}`" for v in ahead),
-        picture=PICTURE,
+        weights=", ".join(f"{v:g}" for v in weights),
+        models=", ".join(f"`{v}`" for v in models),
         competitors=len(published),
         orders=order_table(orders),
         apart=table(
@@ -101,48 +118,67 @@ def main(argv: Sequence[str] | None = None) -> None:
     (given.docs / "ranking.md").write_text(text, encoding="utf-8")
 
 
-def swept(methods: Sequence[str], settings: dict[str, object]) -> pd.DataFrame:
-    """The summary of a sweep of Designed Test II."""
-    results = mc.sweep("designed-2", list(methods), settings=settings, world="closed-form", jobs=1, progress=False)
-    return results.summary()
+def swept(methods: Sequence[str], settings: dict[str, object], model: str | None = None) -> pd.DataFrame:
+    """The failure rates of a sweep of Designed Test II; the model is that of the designed tests if none is given."""
+    results = mc.sweep(
+        "designed-2", list(methods), model=model, settings=settings, world="closed-form", jobs=1, progress=False
+    )
+    columns = ["method", "n", "censored", "host_not_reached", "failure_pct"]
+    return results.summary()[columns].assign(weight=np.nan, model="")
 
 
-def taus(rows: pd.DataFrame, published: dict[str, float]) -> pd.DataFrame:
-    """Kendall's tau with the published order, per setting, and whether the order is the published one."""
+def taus(
+    rows: pd.DataFrame, published: dict[str, float], weights: Sequence[float], models: Sequence[str]
+) -> pd.DataFrame:
+    """Kendall's tau with the published order, per setting, the methods that fail least, and the failure rates."""
     found = []
-    for setting, here in rows.groupby(["ahead", "speed_limit", "length"], sort=False):
-        rates = here.set_index("method")["failure_pct"][list(published)]
-        tau = float(kendalltau(rates, list(published.values())).statistic)
-        best = ", ".join(rates.index[rates == rates.min()])
-        found.append((*setting, 0.0 if np.isnan(tau) else tau, best))
-    return pd.DataFrame(found, columns=["ahead", "speed_limit", "length", "tau", "best"])
+    for setting, here in rows.groupby(SETTING, sort=False):
+        for weight, model in product(weights, models):
+            own = here["weight"].isin([weight]) | (here["model"] == model) | here["method"].isin(RULES[:-1])
+            rates = here[own].set_index("method")["failure_pct"][list(published)]
+            tau = float(kendalltau(rates, list(published.values())).statistic)
+            best = ", ".join(rates.index[rates == rates.min()])
+            found.append((*setting, weight, model, 0.0 if np.isnan(tau) else tau, best, *rates))
+    return pd.DataFrame(found, columns=[*SETTING, *OWN, "tau", "best", *published])
 
 
-def conclusion(rows: pd.DataFrame, orders: pd.DataFrame, published: dict[str, float]) -> str:
+def conclusion(orders: pd.DataFrame, published: dict[str, float]) -> str:
     """What the settings show, in a paragraph."""
     same, lead = int((orders["tau"] > 0.999).sum()), orders["best"].value_counts()
-    by_setting = rows.pivot(index=["ahead", "speed_limit", "length"], columns="method", values="failure_pct")
-    rules = pd.Series(published)[list(RULES)]
-    nearest = (by_setting[list(RULES)] - rules).abs().sum(axis=1).idxmin()
-    theirs = ", ".join(f"{who} {by_setting.loc[nearest, who]:.1f} % ({rate:g} %)" for who, rate in published.items())
+    off = orders[list(published)] - pd.Series(published)
+    rules = orders.loc[off[list(RULES)].abs().sum(axis=1).idxmin()]
+    every = orders.loc[off.abs().sum(axis=1).idxmin()]
+    theirs = ", ".join(f"{who} {rate:g} %" for who, rate in published.items())
     return textwrap.fill(
         "**The rates in Designed Test II depend on choices that the papers do not state more than on the method.** The "
-        f"published order appears in {same} of {len(orders)} settings; Kendall's tau with it goes from "
+        f"published order ({theirs}) appears in {same} of {len(orders)} settings; Kendall's tau with it goes from "
         f"{orders['tau'].min():.2f} to {orders['tau'].max():.2f}. The methods that learn nothing ({', '.join(RULES)}) "
-        f"come nearest to their published rates with a limit of {nearest[1]:g} m/s, cars of {nearest[2]:g} m and ahead "
-        f"`{nearest[0]}`; published rates in brackets: {theirs}. Fewest failures of these {len(published)}, by number "
-        "of settings: "
+        f"come nearest to their published rates with {words(rules, published)}. All {len(published)} together come "
+        f"nearest with {words(every, published)}. Fewest failures, by number of settings: "
         + "; ".join(f"{who} {count}" for who, count in lead.items())
         + ". How much depends on the cars that trained a model is on another page ([models](models.md)).",
         120,
     )
 
 
+def words(setting: pd.Series, published: dict[str, float]) -> str:
+    """A setting and its failure rates."""
+    rates = ", ".join(f"{who} {setting[who]:.1f}" for who in published)
+    return (
+        f"a limit of {setting['speed_limit']:g} m/s, cars of {setting['length']:g} m, ahead `{setting['ahead']}`, "
+        f"weight {setting['weight']:g} and `{setting['model']}` ({rates} %)"
+    )
+
+
 def order_table(orders: pd.DataFrame) -> str:
-    """Tau and the best methods, per setting."""
+    """Tau per setting, a column per choice of the methods' own."""
+    wide = orders.pivot_table("tau", SETTING, OWN, sort=False)
     return table(
-        ["ahead", "limit [m/s]", "length [m]", "tau", "fails least"],
-        [[o.ahead, f"{o.speed_limit:g}", f"{o.length:g}", f"{o.tau:.2f}", o.best] for o in orders.itertuples()],
+        ["ahead", "limit [m/s]", "length [m]", *(f"{weight:g}, `{model}`" for weight, model in wide.columns)],
+        [
+            [s[0], f"{s[1]:g}", f"{s[2]:g}", *(f"{tau:.2f}" for tau in taus)]
+            for s, taus in zip(wide.index, wide.to_numpy(), strict=True)
+        ],
     )
 
 
@@ -168,25 +204,28 @@ def cell(row: pd.Series) -> str:
 
 
 def draw(rows: pd.DataFrame, target: Path) -> None:
-    """A heat map of failure rates per method and meaning of 'ahead'."""
+    """Heat maps of failure rates: a column per method and choice of its own, a row per meaning of 'ahead'."""
     meanings = list(pd.unique(rows["ahead"]))
-    size = (2.1 * len(METHODS) + 1, 2.6 * len(meanings) + 0.4)
+    columns = list(rows.groupby(["method", *OWN], sort=False, dropna=False))
+    size = (1.5 * len(columns) + 1.2, 2.4 * len(meanings) + 0.5)
     figure, axes = plt.subplots(
-        len(meanings), len(METHODS), figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
+        len(meanings), len(columns), figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
     )
     top = max(1.0, float(rows["failure_pct"].max()))
-    for (meaning, method), axis in zip(product(meanings, METHODS), axes.flat, strict=True):
-        here = rows[(rows["ahead"] == meaning) & (rows["method"] == method)]
+    for (meaning, ((_, weight, model), part)), axis in zip(product(meanings, columns), axes.flat, strict=True):
+        here = part[part["ahead"] == meaning]
         rates = here.pivot(index="speed_limit", columns="length", values="failure_pct")
         image = axis.imshow(rates, origin="lower", aspect="auto", cmap="cividis_r", vmin=0, vmax=top)
+        usual = meaning == AHEAD[0] and model in ("", MODELS[0]) and not weight < WEIGHTS[0]
         for (i, j), rate in np.ndenumerate(rates.to_numpy()):
-            default = (rates.index[i], rates.columns[j]) == (29.0, 5.0)
+            default = usual and (rates.index[i], rates.columns[j]) == (29.0, 5.0)
             colour = "white" if rate > 0.55 * top else "black"
             axis.text(j, i, f"{rate:.1f}", ha="center", va="center", color=colour, weight="bold" if default else None)
         axis.set_xticks(range(rates.shape[1]), [f"{v:g}" for v in rates.columns])
         axis.set_yticks(range(rates.shape[0]), [f"{v:g}" for v in rates.index])
-    for axis, method in zip(axes[0], METHODS, strict=True):
-        axis.set_title(method)
+    for axis, ((method, weight, model), _) in zip(axes[0], columns, strict=True):
+        own = model or (f"weight {weight:g}" if weight >= 0 else "")
+        axis.set_title(f"{method}\n{own}", fontsize="small")
     for axis, meaning in zip(axes[:, 0], meanings, strict=True):
         axis.set_ylabel(f"ahead: {meaning}\nspeed limit [m/s]")
     figure.supxlabel("length of both cars [m]", fontsize="medium")

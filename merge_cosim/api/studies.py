@@ -121,10 +121,10 @@ def bounds(
     data: str | Path | None = None,
     source: SourceChoice | None = None,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Find the cases of a replay that no host could pass without a failure, or not without a long delay.
+    """Bound what any host could have done: cases without a way, and the smallest delays.
 
     Args:
-        scenario: A replay scenario, or its file.
+        scenario: A scenario of two cars, or its file.
         settings: As in `merge_cosim.sweep`.
         data: As in `merge_cosim.sweep`.
         source: As in `merge_cosim.sweep`.
@@ -133,7 +133,7 @@ def bounds(
         One row per case, and their counts per site and source.
 
     Raises:
-        UserError: It is no replay, or its data are absent.
+        UserError: It has more cars than two, or its data are absent.
     """
     from merge_cosim.studies.bounds import bounds_of
 

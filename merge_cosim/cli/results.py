@@ -195,14 +195,14 @@ def reproduce(
 
 @app.command()
 def bounds(
-    scenario: Annotated[str, typer.Argument(help="Replay scenario, or its file.")],
+    scenario: Annotated[str, typer.Argument(help="Scenario of two cars, or its file.")],
     set_: Sets = None,
     data: Data = None,
     source: ForceSource = None,
     out: Annotated[Path | None, typer.Option(help="Write one row per case to this .csv file.")] = None,
     json: Json = False,
 ) -> None:
-    """Count the cases of a replay that no host could pass without a failure, or not without a long delay."""
+    """Bound what any host could have done: the cases without a way, and the smallest delays."""
     from merge_cosim.api.studies import bounds as bounds_of
     from merge_cosim.scenarios.settings import parse_setting
 

@@ -84,7 +84,7 @@ def result_rows(
         "min_ttc_s": _finite(c["min_ttc_s"]),
         "max_drac": _masked(c["max_drac"], c["max_drac"] > 0),
         "pet_s": _finite(post_encroachment(c, encounters, dt)),
-        "delay_s": _delay(c, encounters, setting, free_law),
+        "delay_s": delay(c, encounters, setting, free_law),
         "hardest_braking": c["hardest_braking"],
         "mean_jerk": _ratio(c["jerk_sum"] / dt, c["end_cycle"] - 1),
         "first_stable_s": _masked(c["decided_from"] * dt, correct),
@@ -132,11 +132,11 @@ def free_time(station: FloatArray, speed: FloatArray, setting: Setting, law: Fre
     return time
 
 
-def _delay(c: dict[str, AnyArray], encounters: Encounters, setting: Setting, law: FreeDriving) -> FloatArray:
+def delay(c: Mapping[str, AnyArray], encounters: Encounters, setting: Setting, law: FreeDriving) -> FloatArray:
+    """Delay [s] of each host, from the measures of a run: its time to station `GOAL` less that of free driving."""
     rest = free_time(c["end_station"], c["end_speed"], setting, law)
-    arrival = np.where(np.isnan(c["goal_s"]), c["end_cycle"] * setting.dt + rest, c["goal_s"])
-    delay: FloatArray = arrival - free_time(encounters.host_station, encounters.host_speed, setting, law)
-    return delay
+    arrival: FloatArray = np.where(np.isnan(c["goal_s"]), c["end_cycle"] * setting.dt + rest, c["goal_s"])
+    return arrival - free_time(encounters.host_station, encounters.host_speed, setting, law)
 
 
 def _supported(model: IntentionModel | None, encounters: Encounters) -> pa.Array:

@@ -12,7 +12,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import Setting
 from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.scoring.rules import Rules
-from merge_cosim.studies.bounds import bounds, summarise_bounds
+from merge_cosim.studies.bounds import bounds, bounds_of, summarise_bounds
 from merge_cosim.studies.minimum_delay import Ahead, Reach, earliest_pass_behind
 
 DT = 0.1
@@ -56,13 +56,14 @@ def test_a_host_that_must_brake():
     ahead = bound(-40.0, 20.0, steady(-60.0, 10.0))  # 2 s against 6 s
     assert ahead["by_throttle"]
     assert ahead["min_delay_s"] <= 0.0  # nothing is sooner than full throttle, not even free driving
+    assert ahead["found_delay_s"] == ahead["min_delay_s"]
 
 
 def test_no_way_at_all():
     # the host cannot stop before the point any more, and the merging car stands across it
     row = bound(-10.0, 20.0, np.concatenate([steady(-1.0, 10.0, 2), np.full(100, 0.0)]))
     assert not row["feasible"]
-    assert np.isnan(row["min_delay_s"])
+    assert np.isnan(row[["min_delay_s", "found_delay_s"]].to_list()).all()
     assert row["infeasible_in_time"]
 
 
@@ -72,12 +73,15 @@ def test_a_slow_car_ahead_costs_at_least_its_own_time():
     assert row["by_braking"]
     assert not row["by_throttle"]
     assert row["min_delay_s"] > 1.0
+    assert row["found_delay_s"] == pytest.approx(row["min_delay_s"], abs=0.3)  # by the search, on a coarser grid
     assert summarise_bounds(bounds(load_scenario("us101-replay"), pair(-30.0, 15.0, steady(-2.0, 2.0))))[0]["n"] == 1
 
 
-def test_bounds_are_for_replays_alone():
-    with pytest.raises(UserError, match="against a log"):
-        bounds(load_scenario("designed-2"), pair(-40.0, 10.0, steady(-40.0, 10.0)))
+def test_bounds_are_for_two_cars():
+    with pytest.raises(UserError, match="two cars alone"):
+        bounds_of("traffic-light", {}, None, None)
+    with pytest.raises(UserError, match="overlap_from"):
+        bounds_of("designed-2", {"test.overlap_from": "lane_change"}, None, None)
 
 
 def test_soonest_against_every_sequence_of_accelerations():
@@ -156,5 +160,5 @@ def test_bounds_of_real_pairs(data_dir, tmp_path):
     (row,) = json.loads(done.stdout)
     assert row["infeasible"] == 0  # a human drove there
     assert len((tmp_path / "b.csv").read_text().splitlines()) == row["n"] + 1
-    assert merge_cosim("bounds", "designed-2", cwd=tmp_path).returncode == 2
+    assert merge_cosim("bounds", "traffic-light", cwd=tmp_path).returncode == 2
     assert Setting().speed_limit == 29.0

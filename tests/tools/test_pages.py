@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import geometry_page
+import headroom_page
 import method_pages
 import models_page
 import ranking_page
@@ -41,7 +42,7 @@ def test_sensitivity(tmp_path):
 def test_ranking(tmp_path):
     ranking_page.main(["--short", "--docs", str(tmp_path)])
     text = made_like(tmp_path, "ranking.md")
-    assert "4 settings were tried" in text
+    assert "16 settings were tried" in text
     assert "| slot-time |" in text
 
 
@@ -49,6 +50,11 @@ def test_robustness(tmp_path):
     robustness_page.main(["--short", "--docs", str(tmp_path)])
     assert made_like(tmp_path, "sensors.md").count("| `sensing.") == 13
     assert made_like(tmp_path, "tests.md").count("%, ") >= 5 * 10
+
+
+def test_headroom(tmp_path):
+    headroom_page.main(["--short", "--docs", str(tmp_path)])
+    assert "40 cases. The clairvoyant host fails in 0 and" in made_like(tmp_path, "tests.md")
 
 
 def test_traffic(tmp_path):
