@@ -90,23 +90,29 @@ def _crossings(tracks: Tracks) -> dict[str, FloatArray]:
 
 def _gaps(tracks: Tracks, rules: Rules) -> dict[str, AnyArray]:
     """What is scored: from when on, the smallest gap and time to collision, the largest DRAC, and the failure."""
-    states, encounter, age = tracks.states, tracks.encounter, tracks.age
-    start = tracks.reached(rules.begun(states) & (age > 0))
-    scored = np.flatnonzero(age >= start[encounter])
-    gap, follows = states.gap[scored], states.merging_ahead[scored]
-    closing = np.where(follows, 1.0, -1.0) * (states.host_speed - states.merging_speed)[scored]
-    min_gap, min_ttc, max_drac = tracks.fill(np.inf), tracks.fill(np.inf), tracks.fill(0.0)
-    np.minimum.at(min_gap, encounter[scored], gap)
-    closer = closing > 0
-    near, fast, whose = np.maximum(gap[closer], 0.0), closing[closer], encounter[scored[closer]]
-    np.minimum.at(min_ttc, whose, near / fast)
-    drac = np.divide(fast * fast, 2.0 * near, out=np.zeros_like(near), where=near > TOLERANCE)
-    np.maximum.at(max_drac, whose, drac)
-    later = np.where(states.merging_ahead[tracks.last], HOST_INTO_MERGING, MERGING_INTO_HOST)
-    kind = np.where(tracks.cycles == start, SIDE, later)
+    begun = rules.begun(tracks.states)
+    begun[tracks.first] = False
+    start = tracks.reached(begun)
     began = start <= tracks.cycles
+    cycles = tracks.cycles[began] - start[began] + 1  # that are scored, of each
+    after = np.cumsum(cycles)
+    first = after - cycles
+    scored = np.arange(after[-1] if len(after) else 0) + np.repeat((tracks.first + start)[began] - first, cycles)
+    states, last = tracks.states.take(scored), tracks.states.take(tracks.last)
+    gap = states.gap
+    closing = np.where(states.merging_ahead, 1.0, -1.0) * (states.host_speed - states.merging_speed)
+    closer, near = closing > 0, np.maximum(gap, 0.0)
+    ttc = np.divide(near, closing, out=np.full_like(gap, np.inf), where=closer)
+    drac = np.divide(closing * closing, 2.0 * near, out=np.zeros_like(gap), where=closer & (near > TOLERANCE))
+    min_gap, min_ttc, max_drac = tracks.fill(np.inf), tracks.fill(np.inf), tracks.fill(0.0)
+    if len(first):
+        min_gap[began] = np.minimum.reduceat(gap, first)
+        min_ttc[began] = np.minimum.reduceat(ttc, first)
+        max_drac[began] = np.maximum.reduceat(drac, first)
+    later = np.where(last.merging_ahead, HOST_INTO_MERGING, MERGING_INTO_HOST)
+    kind = np.where(tracks.cycles == start, SIDE, later)
     return {
-        "kind": np.where(began & (states.gap[tracks.last] < -TOLERANCE), kind, 0),
+        "kind": np.where(began & (last.gap < -TOLERANCE), kind, 0),
         "scored_from": np.where(began, start, -1),
         "scored_to_end": tracks.cycles >= start + rules.horizon_cycles,
         "min_gap_m": min_gap,

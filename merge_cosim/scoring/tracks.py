@@ -52,13 +52,19 @@ class Tracks:
             tracks: Their records, shape (RECORDED + channels, cycles + 1) each.
             channels: Names of what the world recorded beside the states.
         """
-        case = np.array(cases, dtype=np.int64)
         sizes = np.array([track.shape[1] for track in tracks], dtype=np.int64)
         rows = np.concatenate([np.empty((RECORDED + len(channels), 0)), *tracks], axis=1)
-        lengths = np.repeat(encounters.start[4:, case], sizes, axis=1)
+        return cls.of_rows(encounters, np.array(cases, dtype=np.int64), sizes - 1, rows, channels)
+
+    @classmethod
+    def of_rows(
+        cls, encounters: Encounters, case: IntArray, cycles: IntArray, rows: FloatArray, channels: Sequence[str] = ()
+    ) -> Tracks:
+        """The same of records that lie end to end already, shape (RECORDED + channels, N)."""
+        lengths = np.repeat(encounters.start[4:, case], cycles + 1, axis=1)
         states = Observation(rows[HOST_STATION], rows[HOST_SPEED], rows[MERGING_STATION], rows[MERGING_SPEED], *lengths)
         around = dict(zip(channels, rows[RECORDED:], strict=True))
-        return cls(states, rows[LOG_ODDS], case, sizes - 1, around)
+        return cls(states, rows[LOG_ODDS], case, cycles, around)
 
     @cached_property
     def last(self) -> IntArray:
@@ -78,11 +84,15 @@ class Tracks:
     @cached_property
     def age(self) -> IntArray:
         """The cycle of each state, counted from its encounter's start, shape (N,)."""
-        return np.arange(len(self.log_odds)) - self.first[self.encounter]
+        return np.arange(len(self.log_odds)) - np.repeat(self.first, self.cycles + 1)
 
     def reached(self, where: BoolArray) -> IntArray:
         """The first cycle of each encounter in which something holds; `NEVER` if in none. Shape (m,)."""
-        return np.minimum.reduceat(np.where(where, self.age, NEVER), self.first)
+        places = np.flatnonzero(where)
+        if not len(places):
+            return np.full(len(self.cycles), NEVER)
+        place = places[np.minimum(np.searchsorted(places, self.first), len(places) - 1)]
+        return np.where((place >= self.first) & (place <= self.last), place - self.first, NEVER)
 
     def fill(self, value: float) -> FloatArray:
         """A measure with the same value for every encounter, shape (m,)."""

@@ -11,7 +11,7 @@ import pandas as pd
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.observation import Setting
-from merge_cosim.core.units import AnyArray, FloatArray
+from merge_cosim.core.units import AnyArray, FloatArray, IntArray
 from merge_cosim.merging_cars.base import MergingCar
 from merge_cosim.scoring.rules import Rules, Watch
 from merge_cosim.scoring.scoring import score
@@ -23,6 +23,8 @@ from merge_cosim.simulation.worlds.base import Ended, World, WorldKind
 
 SCORED_TOGETHER = 128
 """Encounters that are over wait until so many can be scored in one go; their tracks then still fit the cache."""
+SCORED_IN_PLACE = 512
+"""The same where the recorder holds all of them, and nothing else needs the cache meanwhile."""
 
 
 @dataclass
@@ -145,6 +147,10 @@ class Loop:
         self._make_room()
         self._effort, self._stepped = Effort(), world.step_s
         self._over: dict[int, FloatArray] = {}
+        alone = encounters is not None and world.slots >= len(encounters)
+        self._last = np.full(world.slots, -1) if alone and traced == () else None
+        """The last cycle in each slot, where every encounter has one to itself: then the recorder holds them all."""
+        self._cases = np.zeros(world.slots, dtype=np.int64)
         self._columns: dict[str, AnyArray] = {}
         self._traces: dict[str, pd.DataFrame] = {}
 
@@ -194,7 +200,10 @@ class Loop:
         """End what is still open, score, and return what came out."""
         if ended := self._world.finish(self._age):
             self._finish(ended)
-        self._score()
+        if self._last is not None:
+            self._score_in_place(self._last)
+        else:
+            self._score()
         world, effort = self._world, self._effort
         if world.vehicle_steps is not None:
             effort.vehicle_steps = world.vehicle_steps
@@ -238,6 +247,9 @@ class Loop:
         self._active[slots] = self._open[slots] = False
         valid, over_at = self._age[slots] - ended.back, self._over_at[slots]
         last = np.where(over_at >= 0, np.minimum(over_at, valid), valid)
+        if self._last is not None:
+            self._last[slots], self._cases[slots] = last, ended.cases
+            return
         for number, (slot, case, end) in enumerate(
             zip(slots.tolist(), ended.cases.tolist(), last.tolist(), strict=True)
         ):
@@ -263,6 +275,19 @@ class Loop:
             return
         tracks = Tracks.of(encounters, list(self._over), list(self._over.values()), self._world.channels)
         self._over.clear()
+        self._take_scores(tracks)
+
+    def _score_in_place(self, last: IntArray) -> None:
+        """Score the encounters of a run in which each had a slot to itself, by neighbouring slots."""
+        encounters = self._world.encounters
+        for first in range(0, len(encounters), SCORED_IN_PLACE):
+            slots = slice(first, min(first + SCORED_IN_PLACE, len(encounters)))
+            rows = self._recorder.from_the_start(slots, last[slots])
+            cases = self._cases[slots]
+            self._take_scores(Tracks.of_rows(encounters, cases, last[slots], rows, self._world.channels))
+
+    def _take_scores(self, tracks: Tracks) -> None:
+        encounters = self._world.encounters
         for name, values in score(tracks, self._rules, encounters.log).items():
             column = self._columns.setdefault(name, np.empty(len(encounters), dtype=values.dtype))
             column[tracks.case] = values

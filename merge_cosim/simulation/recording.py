@@ -72,6 +72,18 @@ class Recorder:
             return self._cycles[first:now, :, slot].T.copy()
         return np.concatenate([self._cycles[first:, :, slot].T, self._cycles[:now, :, slot].T], axis=1)
 
+    def from_the_start(self, slots: slice, cycles: IntArray) -> FloatArray:
+        """Records of some slots end to end, in each of which one encounter began in the very first cycle, (rows, N).
+
+        Args:
+            slots: The k slots.
+            cycles: Cycles of each, shape (k,); the ring holds all of them.
+        """
+        longest = int(cycles.max()) + 1
+        block = np.ascontiguousarray(self._cycles[:longest, :, slots].transpose(1, 2, 0))
+        held = np.flatnonzero(np.arange(longest) <= cycles[:, None])
+        return block.reshape(len(block), -1).take(held, axis=1)
+
     def make_room(self, slots: int, longest: int) -> None:
         """Grow to so many slots, and to encounters of so many cycles; what is recorded stays."""
         length, rows, held = self._cycles.shape

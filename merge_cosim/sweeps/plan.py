@@ -38,7 +38,7 @@ from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.lane_map import LaneMap
 from merge_cosim.sumo.vehicle_types import ROLE
 from merge_cosim.sweeps.cases import LoggedCases, PairCases, TrafficCases
-from merge_cosim.sweeps.closed_form_cases import ClosedFormCases
+from merge_cosim.sweeps.closed_form_cases import ClosedFormCases, side_by_side
 from merge_cosim.sweeps.task import Task
 
 StartMethod = Literal["spawn", "fork"]
@@ -267,14 +267,18 @@ def _by_source(
     scenario: Scenario, encounters: Encounters | RandomStates, request: SweepRequest
 ) -> Iterator[tuple[str, PairCases]]:
     """The cases of each source."""
-    kind = ClosedFormCases if request.world == "closed-form" else PairCases
+
+    def alone(pairs: Encounters | RandomStates) -> PairCases:
+        if request.world == "closed-form":
+            return ClosedFormCases(pairs, host=scenario.host, side_by_side=side_by_side(scenario.test))
+        return PairCases(pairs, host=scenario.host)
+
     if isinstance(encounters, RandomStates):
-        yield RANDOM, kind(encounters, host=scenario.host)
+        yield RANDOM, alone(encounters)
         return
     for source in dict.fromkeys(encounters.source.tolist()):
         chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
-        alone = scenario.full_scene is None
-        yield source, kind(chosen, host=scenario.host) if alone else _in_scenes(scenario, chosen, source, request)
+        yield source, alone(chosen) if scenario.full_scene is None else _in_scenes(scenario, chosen, source, request)
 
 
 def _in_scenes(scenario: Scenario, encounters: Encounters, source: str, request: SweepRequest) -> LoggedCases:

@@ -33,6 +33,16 @@ def test_the_recorder_gives_back_what_went_through_it():
         recorder.seen.host_station[0] = 0.0  # an estimator cannot change what was seen
 
 
+def test_records_from_the_start_lie_end_to_end():
+    recorder, rng = Recorder(4, longest=6), np.random.default_rng(1)
+    for _ in range(6):
+        recorder.decided(*rng.random((2, 4)))
+        recorder.next_cycle()[0][:] = rng.random((4, 4))
+    ends = np.array([5, 2, 6])
+    expected = [recorder.track(1 + number, 6)[:, : end + 1] for number, end in enumerate(ends.tolist())]
+    np.testing.assert_array_equal(recorder.from_the_start(slice(1, 4), ends), np.concatenate(expected, axis=1))
+
+
 def test_growing_keeps_the_record():
     small, large = Recorder(2, longest=3, channels=1), Recorder(4, longest=20, channels=1)
     for cycle in range(10):

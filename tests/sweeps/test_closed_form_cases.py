@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.sweeps.closed_form_cases import ClosedFormCases
+from merge_cosim.core.units import DT
+from merge_cosim.sweeps.closed_form_cases import RECORD_BYTES, ClosedFormCases
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.single import case_alone, trace_case
 from merge_cosim.sweeps.task import Task
@@ -52,6 +53,16 @@ def test_batches_do_not_matter():
         for size in (7, 128):
             pd.testing.assert_frame_equal(whole, rows(task, session, size), check_exact=True)
     session.close()
+
+
+def test_a_long_time_out_leaves_fewer_side_by_side_and_the_rows_as_they_are():
+    (usual,) = tasks("designed-random", "closed-form", 300, ("acc",))
+    (long,) = tasks("designed-random", "closed-form", 300, ("acc",), settings={"test.time_out": 3600})
+    assert isinstance(long.cases, ClosedFormCases)
+    assert long.cases.side_by_side * 3600 / DT * 6 * 8 <= RECORD_BYTES
+    assert long.cases.side_by_side < 300
+    session = WorkerSession()
+    pd.testing.assert_frame_equal(rows(usual, session), rows(long, session), check_exact=True)
 
 
 def test_a_case_alone_ends_as_in_its_batch():
