@@ -73,12 +73,13 @@ class Plots:
             raise UserError(f"parameter '{parameter}' was not varied in this sweep{did_you_mean(parameter, varied)}")
         return variation_figure(summary, parameter, looks(summary["method"]))
 
-    def case(self, quantity: str = "station", scenario: str | None = None) -> Figure:
-        """The case of a scenario on which the methods differ most: both cars over time under every method.
+    def case(self, quantity: str = "station", scenario: str | None = None, case: str | None = None) -> Figure:
+        """A recorded case: both cars over time under every method.
 
         Args:
             quantity: `"station"` or `"speed"` of both cars, or the estimators' `"log_odds"`.
             scenario: A scenario; not needed where the sweep has one only.
+            case: Its name; the case on which the methods differ most, if not given.
 
         Raises:
             UserError: There is no such scenario, or no trace of it.
@@ -88,7 +89,12 @@ class Plots:
         traces = traces[traces["scenario"] == name]
         if traces.empty:
             raise UserError(f"scenario {name}: no trace of it is stored; use mc.run(...).plot()")
-        traces = traces[traces["case"] == traces["case"].iloc[0]]
+        recorded = traces["case"].unique().tolist()
+        if case is not None and case not in recorded:
+            raise UserError(
+                f"plot: case '{case}' is not recorded{did_you_mean(case, recorded)}; use mc.run(...).plot()"
+            )
+        traces = traces[traces["case"] == (case or recorded[0])]
         rows = self._rows(name, None)
         rows = rows[rows["case"] == traces["case"].iloc[0]]
         return case_figure(traces, dict(zip(rows["method"], rows["failed"].astype(bool), strict=True)), quantity)

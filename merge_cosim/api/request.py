@@ -17,6 +17,7 @@ from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.scenarios.scenario import Scenario, family, scenario_of
 from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.sweeps.plan import ScenarioSpec, StartMethod, SweepRequest
+from merge_cosim.sweeps.traces import parse_traces
 
 ScenarioLike: TypeAlias = str | Path | Scenario | Encounters
 """The name of a shipped scenario or of a family of them, a scenario file, a SUMO configuration, a scenario, or
@@ -42,6 +43,7 @@ def request_of(
     start: StartMethod = "spawn",
     dask: str | None = None,
     world: WorldKind = "sumo",
+    traces: str | int | None = None,
 ) -> SweepRequest:
     """Make a request; the arguments are those of `merge_cosim.sweep`.
 
@@ -63,6 +65,7 @@ def request_of(
         dask=dask,
         against=against,
         world=world,
+        traces=parse_traces(traces),
     )
 
 

@@ -67,7 +67,7 @@ class Results:
 
     @cached_property
     def traces(self) -> pd.DataFrame:
-        """Of one illustrative case per scenario, one row per cycle and method."""
+        """Of the recorded cases, one row per cycle and method."""
         return self._store.traces().to_pandas()
 
     @cached_property

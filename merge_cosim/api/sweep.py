@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from merge_cosim.api.progress import sweep_progress
 from merge_cosim.api.request import Methods, Scenarios, request_of
@@ -37,6 +37,7 @@ def sweep(
     resume: bool = False,
     overwrite: bool = False,
     add: bool = False,
+    traces: Literal["all", "failed", "telling"] | int | None = None,
     progress: bool = True,
 ) -> Results:
     """Run every case of some scenarios under some methods.
@@ -70,6 +71,9 @@ def sweep(
         overwrite: Replace the sweep that `out` holds, finished or not.
         add: Add methods, variations, scenarios or cases to the finished sweep in `out`, of the same settings; its rows
             are then those of one sweep of all. Without `methods`, those that it holds.
+        traces: Cases of each scenario that are recorded cycle by cycle, to be watched in the report: `"all"`,
+            `"failed"`, `"telling"` (the methods disagree; up to 200), or a number of them, the most telling first. A
+            few telling ones, if not given. With `add` and nothing else new, traces are added to a finished sweep.
         progress: Show how far the sweep is, on standard error.
 
     Returns:
@@ -93,6 +97,7 @@ def sweep(
         start=start,
         dask=dask,
         world=world,
+        traces=traces,
     )
     results = Results(tempfile.mkdtemp(prefix="merge-cosim-"), temporary=True) if out is None else Results(out)
     with sweep_progress(progress) as told:

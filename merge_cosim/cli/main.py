@@ -97,6 +97,10 @@ def sweep(
         float | None, typer.Option(metavar="SHARE", help="Afterwards run this share of the rows again in SUMO.")
     ] = None,
     add: Annotated[bool, typer.Option("--add", help="Add methods, scenarios or cases to the sweep there.")] = False,
+    traces: Annotated[
+        str | None,
+        typer.Option(metavar="all|failed|telling|N", help="Cases to record for the report's viewer; a few by default."),
+    ] = None,
     wide: Wide = False,
     columns: Columns = None,
     json: Json = False,
@@ -129,6 +133,7 @@ def sweep(
             resume=resume,
             overwrite=overwrite,
             add=add,
+            traces=cast(Any, traces),
         )
         again = (
             None if verify is None else results.verify(verify, data=data, model=model, plugins=plugin or (), jobs=jobs)

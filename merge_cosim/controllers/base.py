@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any, ClassVar, TypeVar
 
+import numpy as np
+
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.registry import Component, Registry
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
@@ -16,9 +18,11 @@ class Controller(Component):
 
     Attributes:
         default_estimator: Estimator of the method that is made of a controller alone.
+        channels: What it can tell of each cycle beside the command, such as the costs of its policies, for traces.
     """
 
     default_estimator: ClassVar[str] = "acc"
+    channels: ClassVar[tuple[str, ...]] = ()
 
     def taken_from(self, estimator: Estimator) -> dict[str, Any]:
         """Parameters that are the estimator's where the two are paired, by name: they are set there alone."""
@@ -43,6 +47,10 @@ class Controller(Component):
             log_odds: `log P(NOT_YIELD) - log P(YIELD)`, shape (n,).
             target: The merging car is the one to keep distance to, shape (n,).
         """
+
+    def told(self) -> FloatArray:
+        """Values of `channels` in the cycle of the last command, shape (channels, n); NaN where there is none."""
+        return np.zeros((0, 0))
 
 
 controllers: Registry[Controller] = Registry("controller", "merge_cosim.controllers")

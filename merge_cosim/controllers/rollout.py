@@ -94,6 +94,7 @@ class Rollout(ReactingDriver, Acc):
 
     name: ClassVar[str] = "rollout"
     default_estimator: ClassVar[str] = "interactive"
+    channels: ClassVar[tuple[str, ...]] = ("policy", *(f"cost_s {name}" for name in POLICIES))
     behind_margin: NonNegativeFloat = 1.2
     steps: Count = 32
     step: PositiveFloat = 0.25
@@ -182,6 +183,7 @@ class Rollout(ReactingDriver, Acc):
         self.last_costs = np.zeros((count, len(POLICIES), len(DRIVER_TYPES)))
         self.last_belief = np.zeros((count, len(DRIVER_TYPES)))
         self.risk = np.zeros(count)
+        self._plans = np.zeros(count, dtype=bool)
         self.escape_status = np.zeros(count, dtype=np.int64)
 
     def reset(self, rows: IntArray) -> None:
@@ -196,7 +198,7 @@ class Rollout(ReactingDriver, Acc):
 
         wanted = super().command(seen, log_odds, target)
         state = np.stack([getattr(seen, name) for name in STATE])
-        plans = ~seen.merging_in_lane
+        self._plans = plans = ~seen.merging_in_lane
         self.last_belief = self._belief(seen, log_odds)
         margins, delays = self._margins, self._delays
         if self._filter is not None:
@@ -228,6 +230,11 @@ class Rollout(ReactingDriver, Acc):
             constrain(state, guarded, _LEVELS, self._bounds, command, self.escape_status)
         self._last = command.copy()
         return command
+
+    def told(self) -> FloatArray:
+        """The number of the chosen policy in `POLICIES`, and the expected cost of each [s]."""
+        costs = (self.last_costs * self.last_belief[:, None]).sum(axis=2).T
+        return np.where(self._plans, np.vstack([self.last_policy, costs]), np.nan)
 
     def _belief(self, seen: Observation, log_odds: FloatArray) -> FloatArray:
         """Belief over `DRIVER_TYPES`, shape (n, types)."""

@@ -119,11 +119,12 @@ def _beliefs(stem: str, chapter: Chapter, drawn: Any) -> Iterator[Drawing]:
 
 def _cases(report: Report, drawn: Any) -> Iterator[Drawing]:
     plain = report.results[report.results["variation"] == ""]
-    for one in report.recorded:
+    first = {one["scenario"]: one for one in reversed(report.recorded)}
+    for one in first.values():
         trace = report.traces[(report.traces["scenario"] == one["scenario"]) & (report.traces["case"] == one["case"])]
         rows = plain[(plain["scenario"] == one["scenario"]) & (plain["case"] == one["case"])]
         failed = dict(zip(rows["method"], rows["failed"].astype(bool), strict=True))
-        stem = f"{one['scenario']}-case-{one['case']}"
+        stem = f"{one['scenario']}-case-{one['case'].replace('/', '-')}"
         stations, speeds = case_figures.path_figures(trace, failed, drawn)
         yield Drawing(f"{stem}-station", stations, trace)
         yield Drawing(f"{stem}-speed", speeds, trace)

@@ -16,7 +16,7 @@ from merge_cosim.report.export import write_tables
 from merge_cosim.report.html import render
 from merge_cosim.report.methods import in_order, looks
 from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER
-from merge_cosim.report.trace_data import recorded_cases
+from merge_cosim.report.trace_data import fitting, recorded_cases
 from merge_cosim.report.traffic_table import traffic_table
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.results.statistics.summary import GROUP, compare_all
@@ -33,8 +33,9 @@ class Report:
 
     Attributes:
         manifest: How the results were made.
-        results, summary, traces: The rows of the folder; the summary with what only a reader needs.
-        recorded: The recorded cases for the viewer, and `left_out`, how many more there are.
+        results, summary: The rows of the folder; the summary with what only a reader needs.
+        traces, recorded: The recorded cases that the page has room for, as rows and for the viewer.
+        left_out: How many more there are.
         chapters: One for each scenario, site and source.
         variations: A table for each varied parameter.
         contacts, traffic: The tables of collisions and of scenes; None where there is none.
@@ -81,8 +82,9 @@ def read_report(folder: Path, against: str | None = None) -> Report:
     manifest = store.read_json(MANIFEST)
     labels = [f"{name}={value}" for name, values in manifest["variations"] for value in values]
     summary = tables.summary_frame(_compared(store.read_json(SUMMARY_JSON), results, against), labels)
-    traces = store.traces().to_pandas()
-    recorded, left_out = recorded_cases(traces, results)
+    shown, left_out = fitting(store.recorded())
+    traces = store.traces(shown).to_pandas()
+    recorded = recorded_cases(traces, results)
     said = verdicts(summary, results)
     chapters = [
         chapter(i, one, results, summary, manifest, said[one.scenario, one.site, one.source], recorded)

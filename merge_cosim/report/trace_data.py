@@ -21,32 +21,43 @@ QUANTITIES = {
     "follows": ("not_yield", 0),
 }
 """What is drawn of each cycle: its column, and the digits that are kept after the point."""
-MOST_CYCLES = 150_000
-"""Cycles that a page holds; cases beyond are left to traces.parquet. Some 15 characters each."""
+MOST_CYCLES = 240_000
+"""Cycles that a page holds; cases beyond are left to traces.parquet. Some 15 characters each, or 35 with costs."""
+COST = "cost_s "
+"""Columns of the expected costs of a planner's policies [s] begin so; a policy's number is its place among them."""
 
 
-def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> tuple[list[dict[str, Any]], int]:
-    """The recorded cases with all their methods, and how many cases did not fit.
+def fitting(recorded: pd.DataFrame) -> tuple[list[tuple[str, str]], int]:
+    """The recorded cases that a page has room for, as scenario and case, and how many others there are.
+
+    The first of every scenario comes first, then the second of every one, and so on.
+
+    Args:
+        recorded: Scenario, case, method and number of cycles of every record.
+    """
+    cases = recorded.groupby(["scenario", "case"], sort=False)["cycles"].sum().reset_index()
+    cases = cases.iloc[cases.groupby("scenario").cumcount().argsort(kind="stable")]
+    shown = cases[cases["cycles"].cumsum() <= MOST_CYCLES].sort_index()
+    return list(zip(shown["scenario"], shown["case"], strict=True)), len(cases) - len(shown)
+
+
+def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> list[dict[str, Any]]:
+    """Recorded cases with all their methods.
 
     Numbers are stored as whole multiples of their last digit, each as its difference from the cycle before.
 
     Args:
-        traces: Records of all cases, one row per cycle.
+        traces: Their records, one row per cycle.
         results: All result rows.
     """
     if traces.empty:
-        return [], 0
+        return []
     rows = results[results["variation"] == ""].drop_duplicates(
         ["scenario", "case", "method"]
     )  # of several models the first
     rows = rows.set_index(["scenario", "case", "method"]).sort_index()
     found: list[dict[str, Any]] = []
-    cycles = left_out = 0
     for (scenario, case), records in traces.groupby(["scenario", "case"], sort=False):
-        cycles += len(records)
-        if cycles > MOST_CYCLES:
-            left_out += 1
-            continue
         runs = [_run(records[records["method"] == method], method) for method in in_order(records["method"])]
         for run in runs:
             run |= _outcome(rows, (scenario, case, run["method"]))
@@ -62,18 +73,25 @@ def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> tuple[list[di
                 "runs": runs,
             }
         )
-    return found, left_out
+    return found
 
 
 def _run(records: pd.DataFrame, method: str) -> dict[str, Any]:
-    again = np.flatnonzero(np.diff(records["time_s"]) <= 0)  # the same method with another model
-    records = records.iloc[: again[0] + 1] if len(again) else records
     odds = records["log_odds"].to_numpy(dtype=float)
     columns = records.assign(belief=0.5 + 0.5 * np.tanh(0.5 * odds))
     series = {name: differences(columns[column], decimals) for name, (column, decimals) in QUANTITIES.items()}
     time = records["time_s"].to_numpy(dtype=float)
     step = float(time[1] - time[0]) if len(time) > 1 else 0.1
-    return {"method": method, "start": round(float(time[0]), 3), "step": round(step, 3), "series": series}
+    run = {"method": method, "start": round(float(time[0]), 3), "step": round(step, 3), "series": series}
+    costs = [name for name in map(str, records) if name.startswith(COST) and records[name].notna().any()]
+    if not costs:
+        return run
+    planned = records[records[costs[0]].notna()]  # up to the cycle in which the merging car is in the lane
+    return run | {
+        "policies": [name.removeprefix(COST) for name in costs],
+        "costs": [differences(planned[name], 1) for name in costs],
+        "policy": differences(planned["policy"], 0),
+    }
 
 
 def _outcome(rows: pd.DataFrame, key: tuple[Any, ...]) -> dict[str, Any]:

@@ -57,14 +57,30 @@ def require(file: Path, held: pa.Schema, expected: Iterable[pa.Field]) -> None:
             raise UserError(f"{file}: damaged (no column '{column.name}' of type {column.type}); run the sweep again")
 
 
-def read_table(file: Path, columns: Sequence[str] | None = None) -> pa.Table:
-    """Read a Parquet file, or some of its columns.
+def read_table(file: Path, columns: Sequence[str] | None = None, filters: Any = None) -> pa.Table:
+    """Read a Parquet file, or some of its columns, or the rows for which pyarrow's `filters` hold.
 
     Raises:
         UserError: It is missing or damaged.
     """
+    with _damage(file):
+        return pq.read_table(file, columns=columns, filters=filters)
+
+
+def read_schema(file: Path) -> pa.Schema:
+    """Names and types of a Parquet file's columns.
+
+    Raises:
+        UserError: It is missing or damaged.
+    """
+    with _damage(file):
+        return pq.read_schema(file)
+
+
+@contextmanager
+def _damage(file: Path) -> Iterator[None]:
     try:
-        return pq.read_table(file, columns=columns)
+        yield
     except FileNotFoundError:
         raise UserError(f"{file}: missing; run the sweep again") from None
     except (pa.ArrowInvalid, OSError) as error:

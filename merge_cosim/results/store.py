@@ -22,6 +22,7 @@ from merge_cosim.results.files import (
     is_whole,
     parquet_options,
     read_json,
+    read_schema,
     read_table,
     replacing,
     require,
@@ -56,6 +57,8 @@ _TRACE = [
 ]
 """The columns that every record has."""
 
+NO_RECORDS = pd.DataFrame({name: pd.Series(dtype=str) for name in ("scenario", "case", "method")})
+"""No record, with the columns that come first."""
 STRETCH_ROWS = 100_000
 """Rows that are sorted and written at a time; more where more cases lie between each other."""
 PART_ROWS = 1_000_000
@@ -85,6 +88,7 @@ class ResultFolder:
         self.path = path
         self._parts = path / "parts"
         self._plan = self._parts / "plan.json"
+        self._records = path / "records"
 
     def begin(self, plan: dict[str, Any], resume: bool = False, overwrite: bool = False) -> None:
         """Make ready for a sweep; parts of an interrupted one are kept if it was the same and is to be resumed.
@@ -321,20 +325,63 @@ class ResultFolder:
                 for number in range(file.num_row_groups):
                     yield file, number
 
-    def write_traces(self, records: pa.Table) -> None:
-        """Write the cycle-by-cycle records of the illustrative cases."""
-        write_table(self.path / TRACES, records)
+    def begin_traces(self, keep: bool) -> None:
+        """Make ready for `add_records`; `keep` the traces that are there."""
+        for file in self._records.glob("*.parquet"):  # of a sweep that was interrupted
+            file.unlink()
+        if keep:
+            self.add_records("+", self.traces())  # first by name
 
-    def traces(self) -> pa.Table:
-        """Read them: scenario, case, method and one row per cycle.
+    def add_records(self, name: str, records: pa.Table) -> None:
+        """Keep cycle-by-cycle records for `write_traces`, which joins them in the order of their names."""
+        self._records.mkdir(exist_ok=True)
+        write_table(self._records / f"{name}.parquet", records)
+
+    def write_traces(self) -> None:
+        """Join the records to one file, holding no more than one piece at a time."""
+        files = sorted(self._records.glob("*.parquet"))
+        schema = pa.unify_schemas([pa.Schema.from_pandas(NO_RECORDS), *map(pq.read_schema, files)])
+        schema = schema.remove_metadata()
+        with (
+            replacing(self.path / TRACES) as unfinished,
+            pq.ParquetWriter(unfinished, schema, compression="zstd") as writer,
+        ):
+            for file in files:
+                writer.write_table(pq.read_table(file, schema=schema))
+        for file in files:
+            file.unlink()
+        if files:
+            self._records.rmdir()
+
+    def traces(self, cases: Iterable[tuple[str, str]] | None = None) -> pa.Table:
+        """Read the cycle-by-cycle records: scenario, case, method and one row per cycle.
+
+        Args:
+            cases: Scenario and case of those that are wanted; all, if not given.
 
         Raises:
             UserError: They are missing or damaged.
         """
-        records = read_table(self.path / TRACES)
-        if len(records):  # of living traffic alone there are none
-            require(self.path / TRACES, records.schema, _TRACE)
-        return records
+        file = self.path / TRACES
+        wanted: dict[str, list[str]] = {}
+        for scenario, case in cases or ():
+            wanted.setdefault(scenario, []).append(case)
+        which = [[("scenario", "=", scenario), ("case", "in", names)] for scenario, names in wanted.items()]
+        self._check_traces()
+        return read_table(file, filters=which or None)
+
+    def _check_traces(self) -> None:
+        file = self.path / TRACES
+        held = read_schema(file)
+        if len(held) > len(NO_RECORDS.columns):  # of living traffic alone there may be no record
+            require(file, held, _TRACE)
+
+    def recorded(self) -> pd.DataFrame:
+        """Scenario, case and method of every record, in their order, with its number of cycles."""
+        self._check_traces()
+        names = NO_RECORDS.columns.tolist()
+        rows = read_table(self.path / TRACES, names).to_pandas()
+        return rows.groupby(names, sort=False).size().rename("cycles").reset_index()
 
     def write_json(self, name: str, document: Any) -> None:
         """Write one JSON file of the folder."""

@@ -80,6 +80,10 @@ class DriverBlocks:
             if len(own):
                 block.reset(rows[own] - number * self._size, labels[own], keys[own])
 
+    def told(self) -> FloatArray:
+        """What the controllers tell of the last cycle, shape (their channels, slots); see `Controller.told`."""
+        return np.concatenate([block.controller.told() for block in self._blocks], axis=1)
+
     def decide(self, seen: Observation, active: BoolArray) -> tuple[FloatArray, FloatArray]:
         """See `HostDriver.decide`; blocks without an active slot are left out, and their entries mean nothing."""
         if len(self._blocks) == 1 and np.count_nonzero(active):

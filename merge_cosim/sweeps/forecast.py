@@ -18,6 +18,8 @@ CAR_US = 5.5
 PASSAGE_S, USUAL_CARS = 70.0, 50.0
 """Time that a car of generated traffic is on the ramp's net [s], and cars on it where a route file makes them."""
 MINUTE = 60.0
+TELL_S = 10.0
+"""What there is to run is told where it takes about this long [s] or longer."""
 
 
 def seconds(tasks: Sequence[Task], jobs: int) -> float:

@@ -65,6 +65,7 @@ class SweepRequest:
         dask: Address of a Dask scheduler, or `local`; None for processes of this machine.
         against: Method that the others are compared with on the same cases; None for pgm, if it is there.
         world: What moves the cars.
+        traces: Cases that are recorded cycle by cycle, see `sweeps.traces.Traces`.
     """
 
     scenarios: Sequence[ScenarioSpec]
@@ -81,6 +82,7 @@ class SweepRequest:
     dask: str | None = None
     against: str | None = None
     world: WorldKind = "sumo"
+    traces: Literal["all", "failed", "telling"] | int | None = None
 
 
 def plan(request: SweepRequest) -> list[Task]:

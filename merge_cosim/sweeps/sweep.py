@@ -24,6 +24,7 @@ from merge_cosim.results.store import (
     CALIBRATION_CSV,
     ENSEMBLE_CSV,
     MANIFEST,
+    NO_RECORDS,
     RIVALS_CSV,
     STRATA_CSV,
     SUMMARY_CSV,
@@ -35,18 +36,17 @@ from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.adding import joined, missing
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
 from merge_cosim.sweeps.executors import executor_for
-from merge_cosim.sweeps.forecast import forecast, seconds
+from merge_cosim.sweeps.forecast import TELL_S, forecast, seconds
 from merge_cosim.sweeps.identity import identity
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.single_timing import time_single_cases
 from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.traces import record
 
 __all__ = ["SweepRequest", "plan", "sweep"]
 
 Progress = Callable[[int, int, str], None]
 """Told the cases done, the cases in all and what is being run; before the first case, what there is to run."""
-TELL_S = 10.0
-"""What there is to run is told where it takes about this long [s] or longer."""
 
 
 @dataclass
@@ -66,29 +66,18 @@ class _Earlier:
     """What is kept of the sweep that is added to.
 
     Attributes:
-        traces: Its traces of the illustrative cases.
+        recorded: Scenario, case and method of its traces.
         cycle_us: For each of its methods the time of one update per encounter in a full batch, and in a batch of one.
     """
 
-    traces: pd.DataFrame = field(default_factory=pd.DataFrame)
+    recorded: pd.DataFrame = field(default_factory=NO_RECORDS.copy)
     cycle_us: dict[str, tuple[float, float | None]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, folder: ResultFolder) -> _Earlier:
         rows = folder.read_json(SUMMARY_JSON)
         times = {row["method"]: (row["cycle_us"], row["cycle_us_single"]) for row in rows if row["cycle_us"]}
-        return cls(folder.traces().to_pandas(), times)
-
-    @property
-    def cases(self) -> dict[str, str]:
-        """The illustrative case of each scenario."""
-        return dict(zip(self.traces["scenario"], self.traces["case"], strict=True)) if len(self.traces) else {}
-
-    def with_traces(self, new: pa.Table) -> pa.Table:
-        """Its traces along with those of the methods that were run now."""
-        if not len(self.traces):
-            return new
-        return pa.Table.from_pandas(pd.concat([self.traces, new.to_pandas()]).drop_duplicates(), preserve_index=False)
+        return cls(folder.recorded()[NO_RECORDS.columns], times)
 
 
 def sweep(
@@ -118,7 +107,7 @@ def sweep(
     against = request.against
     if add:  # the method to compare with may be one of the folder's
         request = replace(request, methods=request.methods or before["methods"], against=None)
-    tasks = plan(request)
+    tasks = every = plan(request)
     what = identity(request, tasks)
     earlier = _Earlier()
     if add:
@@ -142,6 +131,8 @@ def sweep(
     tally = _run(request, list(cut(tasks)), folder, progress)
     ran = perf_counter()
     folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
+    folder.begin_traces(keep=add)
+    record(request, every, folder, earlier.recorded, progress)
     _sum_up(tasks, folder, folder.scenes(), tally, reference_of(what["methods"], what["against"]), earlier)
     effort, run_s = tally.effort, ran - planned
     manifest = {
@@ -154,6 +145,7 @@ def sweep(
             "dask": request.dask,
             "resumed": resume,
             "added": add,
+            "traces": request.traces,
             "scenarios": sorted({*before.get("command", {}).get("scenarios", []), *_files(request)}),
             "data": str(request.data) if request.data else None,
         },
@@ -205,9 +197,8 @@ def _sum_up(
     against: str | None,
     earlier: _Earlier,
 ) -> None:
-    """Write the traces, the summary and the tables beside it, one scenario and variation at a time."""
-    single_us, traces = time_single_cases(tasks, folder, earlier.cases)
-    folder.write_traces(earlier.with_traces(traces))
+    """Write the summary and the tables beside it, one scenario and variation at a time."""
+    single_us = time_single_cases(tasks)
     cycle_us = earlier.cycle_us | {
         name: (1e6 * effort.method_s / effort.encounter_cycles, single_us.get(name))
         for name, effort in tally.by_method.items()

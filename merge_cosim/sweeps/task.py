@@ -6,6 +6,7 @@ from collections.abc import Container, Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
+import pandas as pd
 import pyarrow as pa
 
 from merge_cosim.core.observation import Setting
@@ -14,7 +15,7 @@ from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.rows import result_rows
-from merge_cosim.results.store import with_scene_facts
+from merge_cosim.results.store import NO_RECORDS, with_scene_facts
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.simulation.loop import Effort, Run, simulate
@@ -36,6 +37,7 @@ class Task:
         model: Its learned model, if it needs one.
         seed: SUMO's seed.
         left_out: Names of cases of the scenario that do not fit on its ramp.
+        recorded: Names of encounters that are to be recorded: then these records are what comes out, not rows.
     """
 
     scenario: Scenario
@@ -45,6 +47,7 @@ class Task:
     model: IntentionModel | None = None
     seed: int = 0
     left_out: tuple[str, ...] = ()
+    recorded: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.cases)
@@ -95,21 +98,23 @@ class Task:
         return replace(self, cases=self.cases.take(rows))
 
     def run(self, worker_session: WorkerSession) -> tuple[pa.Table, Effort]:
-        """Simulate the cases; returns their result rows and what they cost.
+        """Simulate the cases; returns their result rows, or the records of the `recorded` ones, and what they cost.
 
         Raises:
             UserError: A component of a plugin has raised something.
         """
         effort, tables, facts = Effort(), [], []
         try:
-            for run, found in self.runs(worker_session):
+            for run, found in self.runs(worker_session, traced=self.recorded or ()):
                 effort.add(run.effort)
-                tables.append(self.rows(run))
+                tables.append(self._records(run) if self.recorded else self.rows(run))
                 facts += [{**self.names, **fact} for fact in found]
         except Exception as error:
             if told := plugin_error(error):
                 raise told from error
             raise
+        if self.recorded:
+            return pa.concat_tables(tables), effort
         return with_scene_facts(pa.concat_tables(tables), facts), effort
 
     def runs(
@@ -139,6 +144,15 @@ class Task:
         )
         # The row `human` is made from the log: neither SUMO nor a method was at work.
         return replace(run, effort=Effort()) if self.method.is_human else run
+
+    def _records(self, run: Run) -> pa.Table:
+        """The records of a run, one row per cycle."""
+        records = [
+            run.traces[name].assign(scenario=self.scenario.name, case=name, method=self.method.name)
+            for name in map(str, run.encounters.case)
+            if name in run.traces
+        ]
+        return pa.Table.from_pandas(pd.concat([NO_RECORDS, *records]), preserve_index=False).replace_schema_metadata()
 
     def rows(self, run: Run) -> pa.Table:
         """The result rows of a run."""

@@ -78,7 +78,7 @@ def test_what_the_scripts_draw_is_what_was_run(swept, page):
     summary = {row["method"]: row for row in _summary(swept)}
     for method, failed in test["map"]["failed"].items():
         assert (sum(failed), sum(test["map"]["n"][method])) == (summary[method]["failures"], 27)
-    [case] = data["cases"]
+    [case] = data["cases"]  # 27 cases: one is recorded
     assert test["cases"] == [0]
     traces = ResultFolder(swept).traces().to_pandas()
     for run in case["runs"]:

@@ -12,6 +12,8 @@ function decode(run) {
     let sum = 0;
     found[name] = steps.map((step) => (sum += step) / 10 ** digits[name]);
   }
+  const summed = (steps, digits) => { let sum = 0; return steps.map((step) => (sum += step) / 10 ** digits); };
+  if (run.policies) Object.assign(found, { policy: summed(run.policy, 0), costs: run.costs.map((steps) => summed(steps, 1)) });
   RUN.decoded.set(run, found);
   return found;
 }
@@ -106,7 +108,8 @@ function drawPlots(runs) {
   host.replaceChildren();
   RUN.plots = [];
   if (!runs.length) return;
-  const areas = Array.from({ length: 5 }, () => {
+  const planners = runs.filter((run) => run.policies);
+  const areas = Array.from({ length: 5 + planners.length }, () => {
     const card = html("figure", { class: "card" }), area = html("div", { class: "chart" });
     card.append(area);
     host.append(card); // all of them first: their number decides how wide each is
@@ -116,7 +119,7 @@ function drawPlots(runs) {
     const area = areas.shift();
     area.before(html("figcaption", {}, title));
     const width = Math.max(area.clientWidth, 260);
-    const series = runs.flatMap((run) => {
+    const series = options.series || runs.flatMap((run) => {
       const records = decode(run), until = records.time.filter((time) => time <= RUN.end + 1e-9).length;
       return [{ name: run.method, x: records.time.slice(0, until), y: pick(records).slice(0, until) }];
     });
@@ -133,6 +136,7 @@ function drawPlots(runs) {
     RUN.plots.push({ cursor, sx: f.sx });
     area.addEventListener("pointerdown", (event) => { pause(); setTime(f.sx.invert(event.clientX - area.getBoundingClientRect().left)); });
     area.addEventListener("pointermove", (event) => { if (event.buttons) setTime(f.sx.invert(event.clientX - area.getBoundingClientRect().left)); });
+    return { ...f, area };
   };
   const stations = runs.flatMap((run) => decode(run).host_station);
   add("Station [m]; dotted: merging car", (r) => r.host_station, { also: (r) => r.merging_station, y: [Math.min(...stations, ...runs.flatMap((run) => decode(run).merging_station)) - 5, clamp(Math.max(...stations), 20, 120)] });
@@ -140,6 +144,28 @@ function drawPlots(runs) {
   add("Acceleration of the host [m/s²]", (r) => r.host_acceleration);
   add("Belief: P(merging car does not yield)", (r) => r.belief, { y: [-0.05, 1.05], frame: { steps: true } });
   add("Decision of the host", (r) => r.follows, { y: [-0.2, 1.2], height: 110, frame: { steps: true, yTicks: [0, 1], yNames: ["go", "follow"] } });
+  for (const run of planners) policyPlot(run, add);
+}
+
+// Expected cost of each policy above the cheapest one's; the driven one is drawn thick.
+const POLICY_COLORS = ["#0072B2", "#56B4E9", "#D55E00", "#CC79A7", "#999933", "#117733", "#332288", "#C6A700", "#882255"];
+const MOST_COST = 8;
+function policyPlot(run, add) {
+  const { time, policy, costs } = decode(run), least = policy.map((_, i) => Math.min(...costs.map((one) => one[i])));
+  const above = (i, value) => Math.min(value - least[i], MOST_COST);
+  const drawn = add(`Expected cost of each policy of ${run.method} above the cheapest [s]; thick: driven`, null, { series: [{ name: run.method, x: time.slice(0, policy.length), y: policy.map((_, i) => above(i, costs[policy[i]][i])) }], y: [-0.3, MOST_COST + 0.3], height: 220 });
+  const driven = drawn.root.querySelector("g .line");
+  driven.setAttribute("style", "stroke-width:6;opacity:.45");
+  driven.removeAttribute("stroke-dasharray");
+  const used = run.policies.map((name, k) => ({ name, k })).sort((a, b) => policy.filter((p) => p === b.k).length - policy.filter((p) => p === a.k).length);
+  const key = html("p", { class: "legend" });
+  for (const { name, k } of used) {
+    const style = `stroke:${POLICY_COLORS[k % POLICY_COLORS.length]};stroke-width:1.2`;
+    const points = costs[k].map((value, i) => `${drawn.sx(time[i]).toFixed(1)} ${drawn.sy(above(i, value)).toFixed(1)}`).filter((_, i) => time[i] <= RUN.end);
+    if (points.length) drawn.root.append(svg("path", { class: "line", style, d: `M${points.join("L")}`, "stroke-dasharray": k % 3 === 0 ? "none" : k % 3 === 1 ? "6 2" : "2 2" }));
+    key.append(html("span", { style: `color:${POLICY_COLORS[k % POLICY_COLORS.length]};font-weight:700` }, "— "), `${name}  `);
+  }
+  drawn.area.after(key);
 }
 
 function setTime(time) {

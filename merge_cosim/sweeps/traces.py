@@ -1,0 +1,158 @@
+"""Which cases of a sweep are recorded cycle by cycle, and their recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from merge_cosim.core.errors import UserError
+from merge_cosim.results.store import ResultFolder
+from merge_cosim.scenarios.methods import is_reference
+from merge_cosim.sweeps.chunks import ChunkQueue, cut
+from merge_cosim.sweeps.executors import executor_for
+from merge_cosim.sweeps.forecast import TELL_S, duration, seconds
+from merge_cosim.sweeps.plan import SweepRequest
+from merge_cosim.sweeps.task import Task
+
+Traces: TypeAlias = Literal["all", "failed", "telling"] | int | None
+"""Cases of each scenario that are recorded: all; those that fail under a method; those on which the methods disagree
+(no more than `MOST_TELLING`); so many, those of disagreement first. None: a few of disagreement, and no living traffic,
+whose scenes would have to be run again."""
+MOST_TELLING = 200
+A_FEW, ONE_IN = 12, 50
+"""Without a wish: one case, and one more of every `ONE_IN`, but no more than `A_FEW`."""
+
+
+COLUMNS = ("method", "failed", "stuck", "distance_m")
+"""Columns of the rows that the choice rests on, beside `case`."""
+
+
+def parse_traces(text: str | int | None) -> Traces:
+    """What `--traces` takes.
+
+    Raises:
+        UserError: It is none of that.
+    """
+    if text in ("all", "failed", "telling", None):
+        return text  # type: ignore[return-value]
+    if str(text).isdecimal() and int(str(text)) > 0:
+        return int(str(text))
+    raise UserError(f"--traces {text}: give all, failed, telling, or a number of cases")
+
+
+def record(
+    request: SweepRequest,
+    tasks: Sequence[Task],
+    folder: ResultFolder,
+    earlier: pd.DataFrame,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> None:
+    """Run the chosen cases again and write their traces into a folder whose rows are merged.
+
+    Args:
+        request: What was asked for.
+        tasks: All its tasks.
+        folder: The folder.
+        earlier: Scenario, case and method of the traces that it holds already and keeps.
+        progress: Told how far it is, where it takes long.
+    """
+    again = list(_recorded(request.traces, tasks, folder, earlier))
+    cost = seconds(again, request.jobs)
+    told = progress if cost >= TELL_S else None
+    how = request if told else replace(request, jobs=1, dask=None)
+    total, done = sum(map(len, again)), 0
+    if told:
+        told(0, total, f"{total:,} runs to record: about {duration(cost)}")
+    queue = ChunkQueue(cut(again))
+    for chunk, records, effort in executor_for(how, len(queue)).run(queue):
+        queue.finished(chunk, effort)
+        folder.add_records(chunk.name, records)
+        done += len(chunk)
+        if told:
+            told(done, total, f"recording {chunk.whole.scenario.name} {chunk.whole.method.name}")
+    folder.write_traces()
+
+
+def _recorded(wanted: Traces, tasks: Sequence[Task], folder: ResultFolder, earlier: pd.DataFrame) -> Iterator[Task]:
+    """The chosen cases as tasks, each case once per method: of several models under the first that was run on it."""
+    done = set(earlier.itertuples(index=False, name=None))
+    chosen: dict[str, list[str]] = {}
+    for task in tasks:
+        scenario, cases = task.scenario.name, task.cases
+        if task.variation or (cases.scenes and wanted is None):
+            continue
+        if scenario not in chosen:
+            before = earlier.loc[earlier["scenario"] == scenario, "case"].drop_duplicates().tolist()
+            rows = (batch.to_pandas() for batch in folder.batches(scenario, "", COLUMNS))
+            new = [] if before and wanted is None else choose(rows, wanted)
+            chosen[scenario] = list(dict.fromkeys([*before, *new]))
+        places: dict[str, int] = {}
+        for case in chosen[scenario]:
+            place = None if (scenario, case, task.method.name) in done else cases.number(case)
+            if place is not None:
+                places[case] = place
+        if not cases.scenes:
+            if places:
+                yield replace(task.take(np.array([*places.values()])), recorded=frozenset(places))
+        else:
+            for number in sorted({*places.values()}):
+                here = frozenset(case for case, place in places.items() if place == number)
+                yield replace(task.part(number, number + 1), recorded=here)
+        done |= {(scenario, case, task.method.name) for case in places}
+
+
+def choose(batches: Iterable[pd.DataFrame], wanted: Traces) -> list[str]:
+    """Names of the cases to record, the most telling first.
+
+    First come cases on which the methods disagree in failing or being stuck, evenly or not: one of each set of methods
+    that do, then a second of each, and so on; in a set, the case first in which the methods' distances at the host's
+    arrival differ most. References do not count, unless there is nothing else.
+
+    Args:
+        batches: Result rows of one scenario, in batches of whole cases: `case` and `COLUMNS`.
+        wanted: Which of them.
+    """
+    most = wanted if isinstance(wanted, int) else {None: A_FEW, "telling": MOST_TELLING}.get(wanted)
+    ranked, count = pd.DataFrame(), 0
+    for rows in batches:
+        found = _by_case(rows)
+        count += len(found)
+        ranked = pd.concat([ranked, found]).sort_values(["split", "spread"], ascending=False, kind="stable")
+        if most is not None:
+            ranked = ranked.groupby("pattern", sort=False).head(most)
+    if ranked.empty:
+        return []
+    ranked["turn"] = ranked.groupby("pattern").cumcount()
+    ranked = ranked.sort_values(["agreed", "turn"], kind="stable")
+    telling = ranked[~ranked["agreed"]] if not ranked["agreed"].all() else ranked[:1]
+    if wanted is None:
+        chosen = telling[: min(A_FEW, 1 + count // ONE_IN)]
+    elif wanted == "telling":
+        chosen = telling[:most]
+    else:
+        chosen = ranked[ranked["failed"]] if wanted == "failed" else ranked[:most]
+    return [str(case) for case in chosen.index]
+
+
+def _by_case(rows: pd.DataFrame) -> pd.DataFrame:
+    """How far the methods disagree on each case."""
+    methods = rows[~rows["method"].isin([name for name in rows["method"].unique() if is_reference(name)])]
+    own = methods if len(methods) else rows
+    bad = own["failed"] | own["stuck"]
+    own = own.assign(bad=bad, pattern=own["method"].where(bad, "")).sort_values("method", kind="stable")
+    by_case = own.groupby("case")
+    share = by_case["bad"].mean()
+    spread = by_case["distance_m"].max() - by_case["distance_m"].min()
+    return pd.DataFrame(
+        {
+            "agreed": (share == 0.0) | (share == 1.0),
+            "split": share * (1 - share),
+            "spread": spread.fillna(0.0),
+            "failed": by_case["failed"].any(),
+            "pattern": by_case["pattern"].agg(" ".join),
+        }
+    )
