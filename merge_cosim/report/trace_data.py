@@ -59,7 +59,9 @@ def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> list[dict[str
     found: list[dict[str, Any]] = []
     for (scenario, case), records in traces.groupby(["scenario", "case"], sort=False):
         runs = [_run(records[records["method"] == method], method) for method in in_order(records["method"])]
+        begun = min(run["start"] for run in runs)  # in living traffic the scene's time
         for run in runs:
+            run["start"] = round(run["start"] - begun, 3)
             run |= _outcome(rows, (scenario, case, run["method"]))
         first = next(iter(runs))
         found.append(
