@@ -13,6 +13,8 @@ import pandas as pd
 from merge_cosim.api.request import ScenarioLike, request_of
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.report.film import STILLS, VIDEOS, Film, Stage, check_file
+from merge_cosim.report.story import outcome
 from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.simulation.worlds.base import WorldKind
@@ -20,6 +22,7 @@ from merge_cosim.sumo.attach import Address
 from merge_cosim.sumo.outputs import SumoOutputs
 from merge_cosim.sweeps.plan import plan
 from merge_cosim.sweeps.single import NO_OUTPUTS, case_alone, trace_case
+from merge_cosim.sweeps.task import Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,10 +37,12 @@ class Run:
     Attributes:
         row: The result row, as in `results.parquet`; of a whole scene of living traffic, its facts.
         trace: One row per cycle: time, station and speed of both cars, log-odds, command.
+        stage: Where it took place, for `video` and `stills`.
     """
 
     row: dict[str, Any]
     trace: pd.DataFrame
+    stage: Stage
 
     def plot(self, quantity: Quantity = "station") -> Figure:
         """Draw both cars over time.
@@ -56,6 +61,59 @@ class Run:
             )
         method = str(self.row["method"])
         return case_figure(self.trace.assign(method=method), {method: bool(self.row["failed"])}, quantity)
+
+    def video(self, file: str | Path) -> Path:
+        """Write a video in real time: both cars on the ramp from above, belief and decision.
+
+        Example:
+            >>> run.video("case.gif")  # doctest: +SKIP
+
+        Args:
+            file: The file, .gif or, with ffmpeg (`pip install 'merge-cosim[video]'`), .mp4.
+
+        Returns:
+            The file.
+
+        Raises:
+            UserError: Another kind of file, no ffmpeg, or a whole scene of living traffic.
+        """
+        check_file("video", file, VIDEOS)
+        self._film("video").write(Path(file))
+        return Path(file)
+
+    def stills(self, count: int, file: str | Path) -> list[Path]:
+        """Write single frames of the video, evenly over the case, the last one with the outcome.
+
+        Example:
+            >>> run.stills(4, "still.svg")  # doctest: +SKIP
+
+        Args:
+            count: How many.
+            file: Such as `still.png`, for `still-1.png`, `still-2.png` and so on; .svg and .pdf, too.
+
+        Returns:
+            The files.
+
+        Raises:
+            UserError: Another kind of file, no still at all, or a whole scene of living traffic.
+        """
+        check_file("stills", file, STILLS)
+        if count < 1:
+            raise UserError(f"stills: {count} of them; give 1 or more")
+        wanted = Path(file)
+        wanted.parent.mkdir(parents=True, exist_ok=True)
+        files = []
+        for number, figure in enumerate(self._film("stills").stills(count), 1):
+            files.append(wanted.with_name(f"{wanted.stem}-{number}{wanted.suffix}"))
+            figure.savefig(files[-1])
+        return files
+
+    def _film(self, what: str) -> Film:
+        if "failed" not in self.row:
+            raise UserError(
+                f"{what}: this is a whole scene of living traffic; run one of its encounters (SCENE/HOST/MERGING)"
+            )
+        return Film(self.stage, self.trace, "{scenario} {case}, {method}".format(**self.row), outcome(self.row))
 
     def __repr__(self) -> str:
         return f"{self._shown.to_string()}\n({len(self.trace):,} cycles in .trace)"
@@ -129,11 +187,23 @@ def run(
     if trace is not None and Path(trace).suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: a trace is written as .csv or .parquet")
     address = Address.parse(attach) if attach else None
-    row, record = trace_case(case_alone(plan(request), case), case, delay if gui else None, outputs, address)
+    task = case_alone(plan(request), case)
+    row, record = trace_case(task, case, delay if gui else None, outputs, address)
     if trace is not None:
         Path(trace).parent.mkdir(parents=True, exist_ok=True)
         if Path(trace).suffix == ".csv":
             record.to_csv(trace, index=False)
         else:
             record.to_parquet(trace, index=False)
-    return Run(row, record)
+    return Run(row, record, _stage(task, record))
+
+
+def _stage(task: Task, record: pd.DataFrame) -> Stage:
+    """Where a task of one case takes place."""
+    pairs = task.cases.encounters
+    if pairs is not None:
+        lengths = float(pairs.host_length[0]), float(pairs.merging_length[0])
+        return Stage(task.ramp, task.scenario.host, lengths, float(pairs.merge_position[0]))
+    if record.empty:
+        return Stage(task.ramp)
+    return Stage(task.ramp, merge_position=float(record["host_x_m"].iloc[0] - record["host_station_m"].iloc[0]))

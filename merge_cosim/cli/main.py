@@ -176,6 +176,15 @@ def run(
     gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui.")] = False,
     delay: Annotated[int, typer.Option(min=0, help="With --gui: milliseconds per step; 100 is real time.")] = 100,
     trace: Annotated[Path | None, typer.Option(help="Write every cycle to this file (.csv or .parquet).")] = None,
+    video: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a video of it (.gif, or .mp4 with ffmpeg).")
+    ] = None,
+    stills: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Write N frames of it, evenly spread, as --stills-file.")
+    ] = None,
+    stills_file: Annotated[
+        Path, typer.Option(metavar="FILE", help="Stills are FILE-1, FILE-2 ... (.png, .svg, .pdf).")
+    ] = Path("still.png"),
     fcd: Annotated[Path | None, typer.Option(help="SUMO's floating car data (.xml).")] = None,
     ssm: Annotated[Path | None, typer.Option(help="SUMO's conflicts, braking and gaps.")] = None,
     lanechange: Annotated[Path | None, typer.Option(help="SUMO's lane changes.")] = None,
@@ -188,11 +197,16 @@ def run(
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
     from merge_cosim.api.run import run as run_case
+    from merge_cosim.report.film import STILLS, VIDEOS, check_file
     from merge_cosim.report.story import story
     from merge_cosim.scenarios.settings import parse_setting
     from merge_cosim.sumo.outputs import SumoOutputs
 
-    row = run_case(
+    if video is not None:
+        check_file("--video", video, VIDEOS)
+    if stills is not None:
+        check_file("--stills-file", stills_file, STILLS)
+    done = run_case(
         scenario,
         case,
         method,
@@ -208,11 +222,15 @@ def run(
         trace=trace,
         outputs=SumoOutputs(fcd, ssm, lanechange, tripinfo, collisions),
         attach=attach,
-    ).row
+    )
     if json:
-        print_json(row)
+        print_json(done.row)
     else:
-        typer.echo("\n".join(story(row)))
+        typer.echo("\n".join(story(done.row)))
+    if video is not None:
+        done.video(video)
+    if stills is not None:
+        done.stills(stills, stills_file)
 
 
 @app.command()

@@ -40,17 +40,19 @@ def _order(row: Mapping[str, Any]) -> str:
 
 
 def _outcome(row: Mapping[str, Any]) -> str:
-    if row["failed"]:
-        text = f"FAILED: {FAILURES[row['failure_kind']]}"
-    elif row["stuck"]:
-        text = "STUCK: time ran out before the host was at the merging point"
-    elif row["censored"]:
-        text = "censored: it could not be scored to its end"
-    else:
-        text = "no failure"
+    text = outcome(row)
     if "min_gap_m" in row:
         text += f"; smallest gap {row['min_gap_m']:.1f} m"
     return f"{text}; ended after {row['end_s']:.1f} s"
+
+
+def outcome(row: Mapping[str, Any]) -> str:
+    """How a case ended, in one phrase."""
+    if row["failed"]:
+        return f"FAILED: {FAILURES[row['failure_kind']]}"
+    if row["stuck"]:
+        return "STUCK: time ran out before the host was at the merging point"
+    return "censored: it could not be scored to its end" if row["censored"] else "no failure"
 
 
 def _cost(row: Mapping[str, Any]) -> str:

@@ -1,0 +1,74 @@
+"""Videos and stills: the cars lie where the record says, and every cycle is a frame."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+import merge_cosim as mc
+from merge_cosim.report import film
+from merge_cosim.report.film import HELD, Film
+
+CASE = "d+1_h11_m11"
+
+
+@pytest.fixture(scope="module")
+def run():
+    return mc.run("designed-2", CASE, "pgm", world="closed-form")
+
+
+def test_both_fronts_are_at_their_stations(run):
+    drawn = Film(run.stage, run.trace, "", "")
+    host, merging = (centres for centres, _ in drawn._cars)
+    np.testing.assert_allclose(host[:, 0] + 2.5, run.trace["host_station_m"], atol=1e-3)
+    np.testing.assert_allclose(host[:, 1], 0.0, atol=1e-3)
+    way = np.hypot(*np.diff(merging[run.trace["merging_station_m"] < -10], axis=0).T).sum()
+    stations = run.trace.loc[run.trace["merging_station_m"] < -10, "merging_station_m"]
+    assert way == pytest.approx(stations.iloc[-1] - stations.iloc[0], abs=0.3)
+    assert merging[0, 1] < -3.0  # the ramp comes from the right
+
+
+def test_a_video_has_a_frame_per_cycle_and_holds_the_last(run, tmp_path):
+    short = replace(run, trace=run.trace[-3:])
+    with Image.open(short.video(tmp_path / "new" / "case.gif")) as gif:
+        lasts = [frame.info["duration"] for frame in ImageSequence.Iterator(gif)]
+    assert len(lasts) == 3  # Pillow joins frames that are the same
+    assert lasts == [100, 100, 100 * (1 + HELD)]
+    assert short.video(tmp_path / "case.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+@pytest.mark.parametrize(("suffix", "head"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_stills_are_numbered(run, tmp_path, suffix, head):
+    files = run.stills(2, tmp_path / f"still.{suffix}")
+    assert [file.name for file in files] == [f"still-1.{suffix}", f"still-2.{suffix}"]
+    assert all(file.read_bytes().startswith(head) for file in files)
+
+
+def test_the_last_frame_says_how_it_ended_and_what_was_decided(run):
+    first, last = (
+        {text.get_text() for text in figure.texts}
+        for figure in Film(run.stage, run.trace, "case", "FAILED: they overlap").stills(2)
+    )
+    assert "case: FAILED: they overlap" in last
+    assert "case" in first
+    assert ("follows it" if run.trace["not_yield"].iloc[-1] else "goes first") in last
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--video", "x.avi"), "--video x.avi: is written as .mp4 or .gif"),
+        (("--stills", 2, "--stills-file", "x.jpg"), "--stills-file x.jpg: is written as .png, .svg or .pdf"),
+    ],
+)
+def test_another_kind_of_file_is_one_line_and_status_2(command, capsys, words, message):
+    assert command("run", "designed-2", "--case", CASE, "--method", "pgm", *words) == 2
+    assert capsys.readouterr().err == f"merge-cosim: {message}\n"
+
+
+def test_no_encoder_is_one_line(run, monkeypatch):
+    monkeypatch.setattr(film, "find_spec", lambda name: None)
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(mc.UserError, match=r"needs ffmpeg: pip install 'merge-cosim\[video\]', or give a \.gif"):
+        run.video("x.mp4")
