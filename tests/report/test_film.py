@@ -22,7 +22,7 @@ def test_both_fronts_are_at_their_stations(run):
     drawn = Film(run.stage, run.trace, "", "")
     host, merging = (centres for centres, _ in drawn._cars)
     np.testing.assert_allclose(host[:, 0] + 2.5, run.trace["host_station_m"], atol=1e-3)
-    np.testing.assert_allclose(host[:, 1], 0.0, atol=1e-3)
+    np.testing.assert_allclose(host[:, 1], 0.0, atol=0.05)  # lanes that meet in a junction are joined halfway
     way = np.hypot(*np.diff(merging[run.trace["merging_station_m"] < -10], axis=0).T).sum()
     stations = run.trace.loc[run.trace["merging_station_m"] < -10, "merging_station_m"]
     assert way == pytest.approx(stations.iloc[-1] - stations.iloc[0], abs=0.3)
