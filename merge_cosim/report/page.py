@@ -159,7 +159,7 @@ def _provenance(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, st
     return {
         "Cases": "; ".join(cases),
         "Sources": "; ".join(f"{source}: {SOURCES.get(source, source)}" for source in sources),
-        "Runs": f"{len(simulated):,} {moved[manifest['world']]}, under {simulated['method'].nunique()} methods",
+        "Runs": f"{len(simulated):,} {moved[manifest['world']]}, under {simulated['method'].nunique()} method(s)",
         "Methods": ", ".join(in_order(results["method"])),
         "Models": ", ".join(f"{name} ({digest})" for name, digest in manifest["models"].items()) or "none",
         "Set": settings or "nothing: all parameters at their defaults",

@@ -46,7 +46,7 @@ function failureMaps(element, map, cases, readout) {
     return [values[0] - half, values.at(-1) + half];
   };
   const layout = (width) => {
-    const left = 36, bottom = 30, height = Math.round(Math.min(width - left, 340)) + bottom;
+    const left = 44, bottom = 30, height = Math.round(Math.min(width - left, 340)) + bottom;
     return { left, bottom, height, cellWidth: (width - left - 2) / columns, cellHeight: (height - bottom - 2) / rows };
   };
   const draw = (method, canvas, width) => {
