@@ -1,32 +1,49 @@
 """Damaged inputs by the thousand: `python tools/fuzz.py --inputs N --seed S` prints what became of them.
 
-Each input is a good one with a few random changes; the real command takes it in a process of its own, with a time
-limit. Allowed are a right result (status 0) and one line (status 2). The rest is kept in `--keep DIR`, to be looked at.
+Each input is a good one with a few random changes. What reads it - a reader of the package, or the whole command - runs
+in a worker process with limits of time and memory, behind the boundary at which the command turns errors into lines.
+Allowed are a right result, as a second reading by independent code finds it (`fuzz_oracles.py`), and one line that
+names the file. The rest is kept in `--keep DIR`, to be looked at.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import random
+import re
 import resource
+import select
 import shutil
 import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fuzz_inputs import TARGETS, Target
+from fuzz_oracles import Wrong
+from fuzz_targets import TARGETS, Refused, Target
+
+from merge_cosim.cli.main import refusal
+from merge_cosim.controllers.base import controllers
+from merge_cosim.estimators.base import estimators
 
 LIMIT = 60.0
 """Longest time for one input [s]."""
 
 MEMORY = 8 << 30
-"""Most memory for one input [bytes]."""
+"""Most memory of a worker [bytes]."""
+
+TURN = 2_000
+"""Inputs that one worker takes; then a fresh one goes on."""
+
+GOOD = ("right", "refused")
 
 
 @dataclass(frozen=True)
@@ -34,90 +51,116 @@ class Outcome:
     """What became of one input.
 
     Attributes:
-        kind: `right`, `refused`, or a fault: `traceback`, `hang`, `crash`, `lines`.
-        words: The command.
-        said: What it wrote to standard error.
+        target: Name of the target.
+        number: Number of the input.
+        kind: `right`, `refused`, or a fault: `wrong`, `traceback`, `line` (which does not name the file), `process` (left behind), `hang`, `crash`.
+        said: The line, or the traceback.
     """
 
+    target: str
+    number: int
     kind: str
-    words: tuple[str, ...]
     said: str
 
 
-def run(words: tuple[str, ...], folder: Path, limit: float = LIMIT) -> Outcome:
-    """Run the command in a copy of this process, in a folder."""
-    said = folder / "stderr.txt"
-    child = os.fork()
-    if not child:
-        _child(words, folder, said)
-    until = time.monotonic() + limit
-    done, status = os.waitpid(child, os.WNOHANG)
-    while not done and time.monotonic() < until:
-        time.sleep(0.005)
-        done, status = os.waitpid(child, os.WNOHANG)
-    if not done:
-        os.killpg(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        return Outcome("hang", words, said.read_text(errors="replace"))
-    text = said.read_text(errors="replace")
-    return Outcome(_kind(os.waitstatus_to_exitcode(status), text), words, text)
-
-
-def _child(words: tuple[str, ...], folder: Path, said: Path) -> None:
-    """Never returns."""
-    os.setsid()
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    os.chdir(folder)
-    for name, descriptor in (("stdout.txt", 1), (said.name, 2)):
-        os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), descriptor)
-    sys.stdout, sys.stderr = (os.fdopen(descriptor, "w") for descriptor in (1, 2))
-    sys.argv = ["merge-cosim", *words]
-    status = 1
+def outcome(target: Target, number: int, seed: int, folder: Path) -> Outcome:
+    """Make one input in a folder and read it, in this process."""
+    folder.mkdir()
+    rng = random.Random(f"{seed} {target.name} {number}")
+    kind, said = "right", ""
+    kept = [(registry, dict(registry._classes)) for registry in (estimators, controllers) if registry.names()]
     try:
-        from merge_cosim.cli.main import main
+        with contextlib.chdir(folder):
+            target.make(folder, rng)()
+    except Wrong as wrong:
+        kind, said = "wrong", str(wrong)
+    except Exception as error:
+        line = str(error) if isinstance(error, Refused) else refusal(error)
+        if line is None:
+            kind, said = "traceback", "".join(traceback.format_exception(error))
+        else:
+            kind = "refused" if re.search(target.names, line) else "line"
+            said = line
+    for registry, classes in kept:  # what a plugin has registered is forgotten
+        registry._classes.clear()
+        registry._classes.update(classes)
+    for name in [name for name in sys.modules if name.startswith("merge_cosim_plugin_")]:
+        del sys.modules[name]
+    if _left_behind():
+        kind = "process"
+    return Outcome(target.name, number, kind, said)
 
-        main()
-    except SystemExit as end:
-        status = int(end.code or 0)
-    except BaseException:
-        sys.excepthook(*sys.exc_info())
+
+def _left_behind() -> bool:
+    """Whether this process has a child."""
+    try:
+        os.waitpid(-1, os.WNOHANG)
+    except ChildProcessError:
+        return False
+    return True
+
+
+def outcomes(targets: list[Target], numbers: range, seed: int, scratch: Path, limit: float) -> Iterator[Outcome]:
+    """Run inputs in worker processes; one that takes too long or dies is replaced."""
+    at = numbers.start
+    while at < numbers.stop:
+        turn = range(at, min(at + TURN, numbers.stop))
+        reading, writing = os.pipe()
+        child = os.fork()
+        if not child:
+            os.close(reading)
+            _work(targets, turn, seed, scratch, writing)
+        os.close(writing)
+        with os.fdopen(reading, "rb") as lines:
+            for number in turn:
+                ready = select.select([lines], [], [], limit)[0] if not lines.peek(0) else [lines]
+                line = lines.readline() if ready else b""
+                at = number + 1
+                if not line:
+                    os.killpg(child, signal.SIGKILL) if not ready else None
+                    yield Outcome(targets[number % len(targets)].name, number, "crash" if ready else "hang", "")
+                    break
+                yield Outcome(**json.loads(line))
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+
+
+def _work(targets: list[Target], numbers: range, seed: int, scratch: Path, pipe: int) -> None:
+    """What a worker does; never returns."""
+    os.setsid()
+    try:
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        for descriptor in (1, 2):
+            os.dup2(nothing, descriptor)
+        sys.stdout, sys.stderr = (os.fdopen(descriptor, "w") for descriptor in (1, 2))
+        for number in numbers:
+            found = outcome(targets[number % len(targets)], number, seed, scratch / str(number))
+            if found.kind in GOOD:
+                shutil.rmtree(scratch / str(number), ignore_errors=True)
+            os.write(pipe, json.dumps(vars(found)).encode() + b"\n")
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)
+        os._exit(0)
 
 
-def _kind(status: int, said: str) -> str:
-    if status < 0:
-        return "crash"
-    if "Traceback (most recent call last)" in said or status not in (0, 2):
-        return "traceback"
-    if status == 2:
-        lines = [line for line in said.splitlines() if line.startswith("merge-cosim: ")]
-        return "refused" if len(lines) == 1 else "lines"
-    return "right"
-
-
-def fuzz(targets: list[Target], inputs: int, seed: int, keep: Path | None = None) -> Counter[tuple[str, str]]:
+def fuzz(
+    targets: list[Target], inputs: int, seed: int, keep: Path | None = None, limit: float = LIMIT
+) -> Counter[tuple[str, str]]:
     """Run so many inputs, the targets in turn; returns how many of each target became what."""
     counts: Counter[tuple[str, str]] = Counter()
-    with tempfile.TemporaryDirectory() as scratch:
+    turns = [target for target in targets for _ in range(target.share)]
+    random.Random(0).shuffle(turns)
+    place = Path("/dev/shm")
+    with tempfile.TemporaryDirectory(dir=place if place.is_dir() else None) as scratch:
         os.environ["MERGE_COSIM_CACHE"] = str(Path(scratch) / "cache")
-        for number in range(inputs):
-            target = targets[number % len(targets)]
-            folder = Path(scratch) / f"{number}"
-            folder.mkdir()
-            rng = random.Random(f"{seed} {target.name} {number}")
-            words = target.make(folder, rng)
-            found = run(words, folder)
-            counts[target.name, found.kind] += 1
-            if found.kind not in ("right", "refused"):
-                print(f"{found.kind}: {target.name}, input {number}: {' '.join(words)[:200]}", file=sys.stderr)
-                print(found.said[-2000:], file=sys.stderr)
-                if keep is not None:
-                    folder.rename(keep / f"{target.name}-{seed}-{number}")
-                    continue
-            shutil.rmtree(folder, ignore_errors=True)
+        for found in outcomes(turns, range(inputs), seed, Path(scratch), limit):
+            counts[found.target, found.kind] += 1
+            if found.kind in GOOD:
+                continue
+            print(f"{found.kind}: {found.target}, input {found.number}: {found.said[-2000:]}", file=sys.stderr)
+            if keep is not None:
+                shutil.move(Path(scratch) / str(found.number), keep / f"{found.target}-{seed}-{found.number}")
     return counts
 
 
@@ -132,18 +175,16 @@ def main() -> int:
     if given.keep:
         given.keep.mkdir(parents=True, exist_ok=True)
     targets = [one for one in TARGETS if not given.only or one.name in given.only.split(",")]
-    import merge_cosim.api.sweep  # so that every copy of this process has it
-
-    assert merge_cosim.api.sweep
     began = time.monotonic()
     counts = fuzz(targets, given.inputs, given.seed, given.keep)
     kinds: Counter[str] = Counter()
     for (_, kind), count in counts.items():
         kinds[kind] += count
     by_target = {one.name: {kind: counts[one.name, kind] for kind in sorted(kinds)} for one in targets}
-    summary = {"inputs": given.inputs, "seed": given.seed, "seconds": round(time.monotonic() - began), **kinds}
-    print(json.dumps({**summary, "targets": by_target}, indent=1))
-    return 0 if set(kinds) <= {"right", "refused"} else 1
+    used = sum(os.times()[:4])
+    summary = {"inputs": given.inputs, "seed": given.seed, "wall_s": round(time.monotonic() - began)}
+    print(json.dumps({**summary, "cpu_s": round(used), **kinds, "targets": by_target}, indent=1))
+    return 0 if set(kinds) <= set(GOOD) else 1
 
 
 if __name__ == "__main__":

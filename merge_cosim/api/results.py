@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import weakref
@@ -141,6 +142,8 @@ class Results:
     def _where(self, where: str | None) -> pd.DataFrame:
         if where is None:
             return self.rows.copy()
+        if _constant_part(where):
+            raise UserError(f"where {where!r}: a part of it names no column; {EXAMPLE}")
         try:
             holds = self.rows.eval(where, engine="python", local_dict={}, global_dict={})
         except pd.errors.UndefinedVariableError as error:
@@ -287,6 +290,16 @@ class Results:
         summary = self.summary()
         shown = summary[[name for name in SHOWN if name in summary]].replace("", None).dropna(axis="columns", how="all")
         return shown.round(2)
+
+
+def _constant_part(condition: str) -> bool:
+    """Whether `not` stands before something without a column in it, which pandas takes for a number's bits."""
+    try:
+        parts = list(ast.walk(ast.parse(condition.strip(), mode="eval")))
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return False  # pandas tells
+    negated = (one.operand for one in parts if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.Not | ast.Invert))
+    return not all(any(isinstance(part, ast.Name) for part in ast.walk(one)) for one in negated)
 
 
 def load_results(folder: str | Path) -> Results:

@@ -311,6 +311,20 @@ def train(
         show_table(report["densities"], "-log P(V_t | V_t-1, I) per transition of held-out cars; less is better")
 
 
+def refusal(error: Exception) -> str | None:
+    """The one line for what a user can mend; None for an error of our own."""
+    if isinstance(error, UserError):
+        return str(error)
+    if isinstance(error, OSError):  # a full disk, a folder without permission: wherever it strikes
+        return f"{error.filename}: cannot be read or written ({error.strerror})" if error.filename else str(error)
+    if isinstance(error, MemoryError):
+        return "not enough memory; try fewer --jobs, or fewer cases"
+    from merge_cosim.core.registry import plugin_error
+
+    told = plugin_error(error)
+    return str(told) if told else None
+
+
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
     import os
@@ -327,18 +341,10 @@ def main() -> None:
             error.show()
             sys.exit(2)
         die(f"{message} (see --help)")
-    except UserError as error:
-        die(str(error))
-    except OSError as error:  # a full disk, a folder without permission: the user's to mend, wherever it strikes
-        die(f"{error.filename}: cannot be read or written ({error.strerror})" if error.filename else str(error))
-    except MemoryError:
-        die("not enough memory; try fewer --jobs, or fewer cases")
     except Exception as error:
-        from merge_cosim.core.registry import plugin_error
-
-        if told := plugin_error(error):
-            die(str(told))
-        raise
+        if (line := refusal(error)) is None:
+            raise
+        die(line)
 
 
 if __name__ == "__main__":

@@ -84,7 +84,8 @@ class Registry(Generic[C]):
         """Make a class a dataclass with keyword parameters, unless it is one.
 
         Raises:
-            UserError: Its name cannot be written in a setting, or another class of the registry has it.
+            UserError: Its name cannot be written in a setting, another class of the registry has it, or a method is
+                missing or takes other arguments than it is called with.
         """
         if not re.fullmatch(r"[\w-]+", cls.name):
             raise UserError(f"{_full_name(cls)}: the name '{cls.name}' must be of letters, digits, '-' and '_'")
@@ -92,6 +93,16 @@ class Registry(Generic[C]):
         if known is not None and _full_name(known) != _full_name(cls):  # else its file was imported anew
             taken = f"the {self.role} name '{cls.name}' is taken by {_full_name(known)}"
             raise UserError(f"{_full_name(cls)}: {taken}; rename yours")
+        if missing := sorted(getattr(cls, "__abstractmethods__", ())):
+            raise UserError(f"{_full_name(cls)}: it has no method '{missing[0]}', which every {self.role} needs")
+        for name, own in vars(cls).items():
+            theirs = next((vars(base)[name] for base in cls.__mro__[1:] if name in vars(base)), None)
+            if not name.startswith("_") and inspect.isfunction(own) and inspect.isfunction(theirs):
+                try:
+                    inspect.signature(own).bind(*inspect.signature(theirs).parameters)
+                except TypeError as error:
+                    called = f"{name}{inspect.signature(theirs)}"
+                    raise UserError(f"{_full_name(cls)}.{name}: {error}; it is called as {called}") from None
         return _as_dataclass(cls)
 
     def names(self) -> list[str]:

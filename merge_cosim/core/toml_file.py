@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterator
 from difflib import get_close_matches
@@ -16,7 +17,7 @@ from merge_cosim.core.errors import UserError
 class Table(BaseModel):
     """A table of a file: a misspelt key is refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -41,7 +42,8 @@ def read_toml(path: Path, model: type[Model], kind: str, **given: Any) -> Model:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UserError(f"{path}: not valid TOML: {error}") from None
     try:
-        return model.model_validate(given | content)
+        # as JSON in strict mode: a list is a tuple and a text is a path, but true is no number
+        return model.model_validate_json(json.dumps(given | content, default=str), strict=True)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
     except ValidationError as error:

@@ -52,6 +52,8 @@ def numbers(cells: pa.ChunkedArray, column: str, place: Place, optional: bool = 
     Raises:
         UserError: A cell is empty or not a number.
     """
+    if pa.types.is_boolean(cells.type):
+        raise UserError(f"{place.source}: {column} holds true and false, not numbers")
     try:
         values = pc.cast(cells, pa.float64())
     except pa.ArrowInvalid:

@@ -212,7 +212,16 @@ def missing_lanes(net: sumolib.net.Net, file: RampFile) -> list[str]:
                 problems.append(f"{key}: the net {file.net} has no edge '{edge}'")
             elif lane not in range(count := net.getEdge(edge).getLaneNumber()):
                 problems.append(f"{key}: edge '{edge}' has no lane {lane}; its lanes are 0 ... {count - 1}")
+            elif lengths := _odd_lengths(net.getEdge(edge)):
+                problems.append(f"{key}: in the net {file.net} the lanes of edge '{edge}' are {lengths} m long")
     return problems
+
+
+def _odd_lengths(edge: sumolib.net.edge.Edge) -> str:
+    """The lengths of an edge's lanes where they differ (as where its id stands twice) or are none; else empty."""
+    lengths = [float(lane.getLength()) for lane in edge.getLanes()]
+    good = len(set(lengths)) == 1 and 0.0 < lengths[0] < math.inf
+    return "" if good else ", ".join(map(str, lengths))
 
 
 def read_net(path: Path) -> sumolib.net.Net:

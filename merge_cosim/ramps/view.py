@@ -3,6 +3,8 @@
 import shutil
 from pathlib import Path
 
+from merge_cosim.core.xml_file import read_xml
+
 FILE_NAME = "view.xml"
 
 ROLES = {"main": 0, "host": 1, "auxiliary": 2, "ramp": 3, "exit": 4}
@@ -13,9 +15,16 @@ _BY_LANE_PARAMETER = {"sumo-gui": 32, "netedit": 13}
 
 
 def view_options(folder: Path) -> tuple[str, ...]:
-    """Options of sumo-gui that show a ramp in its own colours; none if its folder has no view."""
+    """Options of sumo-gui that show a ramp in its own colours; none if its folder has no view.
+
+    Raises:
+        UserError: The view is no XML.
+    """
     file = folder / FILE_NAME
-    return ("--gui-settings-file", str(file.resolve())) if file.is_file() else ()
+    if not file.is_file():
+        return ()
+    read_xml(file)
+    return ("--gui-settings-file", str(file.resolve()))
 
 
 def copy_view(folder: Path, target: Path) -> bool:
@@ -28,10 +37,9 @@ def copy_view(folder: Path, target: Path) -> bool:
 
 def netedit_view(folder: Path, scratch: Path) -> tuple[str, ...]:
     """The same as `view_options` for netedit, with a copy of the view in `scratch` that has netedit's numbers."""
-    if not copy_view(folder, scratch):
+    if not view_options(folder):
         return ()
-    copy = scratch / FILE_NAME
-    text = copy.read_text(encoding="utf-8")
-    number = f'laneEdgeMode="{_BY_LANE_PARAMETER["sumo-gui"]}"'
-    copy.write_text(text.replace(number, f'laneEdgeMode="{_BY_LANE_PARAMETER["netedit"]}"'), encoding="utf-8")
+    text = (folder / FILE_NAME).read_bytes()
+    ours, theirs = (f'laneEdgeMode="{_BY_LANE_PARAMETER[program]}"'.encode() for program in ("sumo-gui", "netedit"))
+    (scratch / FILE_NAME).write_bytes(text.replace(ours, theirs))
     return view_options(scratch)

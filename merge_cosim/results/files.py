@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn, Self
 
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -32,15 +33,35 @@ def csv_rows(file: Path) -> list[dict[str, Any]]:
     """Rows of a CSV table as text; none where there is no such file."""
     if not file.is_file():
         return []
-    with file.open(encoding="utf-8", newline="") as lines:
-        return list(csv.DictReader(lines))
+    with readable(file), file.open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+        if any(None in row or None in row.values() for row in rows):
+            raise ValueError("a row is longer or shorter than the header")
+    return [_Object(row).of(file) for row in rows]
+
+
+def csv_table(file: Path, **options: Any) -> pd.DataFrame:
+    """A CSV table, as `pandas.read_csv` reads it; empty where there is no such file."""
+    with readable(file):
+        return pd.read_csv(file, keep_default_na=False, **options) if file.is_file() else pd.DataFrame()
+
+
+@contextmanager
+def readable(file: Path) -> Iterator[None]:
+    """Reading and taking apart a text of the folder: what goes wrong is a damage of the file."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise UserError(f"{file}: missing; run the sweep again") from None
+    except (OSError, ValueError, OverflowError, RecursionError, csv.Error, pa.ArrowException) as error:
+        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
 
 
 def is_whole(file: Path) -> bool:
-    """Whether a Parquet file is there and ends as it should."""
+    """Whether a Parquet file is there and can be read to its end."""
     try:
-        pq.read_metadata(file)
-    except (pa.ArrowInvalid, OSError):
+        pq.read_table(file, page_checksum_verification=True)
+    except (pa.ArrowException, OSError):
         return False
     return True
 
@@ -63,8 +84,8 @@ def read_table(file: Path, columns: Sequence[str] | None = None, filters: Any = 
     Raises:
         UserError: It is missing or damaged.
     """
-    with _damage(file):
-        return pq.read_table(file, columns=columns, filters=filters)
+    with readable(file):
+        return pq.read_table(file, columns=columns, filters=filters, page_checksum_verification=True)
 
 
 def read_schema(file: Path) -> pa.Schema:
@@ -73,18 +94,8 @@ def read_schema(file: Path) -> pa.Schema:
     Raises:
         UserError: It is missing or damaged.
     """
-    with _damage(file):
+    with readable(file):
         return pq.read_schema(file)
-
-
-@contextmanager
-def _damage(file: Path) -> Iterator[None]:
-    try:
-        yield
-    except FileNotFoundError:
-        raise UserError(f"{file}: missing; run the sweep again") from None
-    except (pa.ArrowInvalid, OSError) as error:
-        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
 
 
 def read_json(file: Path) -> Any:
@@ -93,12 +104,8 @@ def read_json(file: Path) -> Any:
     Raises:
         UserError: It is missing or damaged, now or when a key is looked for that is not there.
     """
-    try:
+    with readable(file):
         return json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=lambda pairs: _Object(pairs).of(file))
-    except FileNotFoundError:
-        raise UserError(f"{file}: missing; run the sweep again") from None
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{file}: damaged ({error}); run the sweep again") from None
 
 
 def write_table(file: Path, rows: pa.Table) -> None:
@@ -108,9 +115,10 @@ def write_table(file: Path, rows: pa.Table) -> None:
 
 
 def parquet_options(schema: pa.Schema) -> dict[str, Any]:
-    """How tables are written: texts by dictionary, as they repeat; numbers as they are, in half the time."""
+    """How tables are written: texts by dictionary, as they repeat; numbers as they are, in half the time;
+    with checksums, so that a changed byte is noticed when they are read."""
     texts = [column.name for column in schema if column.type == pa.string() and column.name != "case"]
-    return {"compression": "zstd", "use_dictionary": texts}
+    return {"compression": "zstd", "use_dictionary": texts, "write_page_checksum": True}
 
 
 def write_text(file: Path, text: str) -> None:

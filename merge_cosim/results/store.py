@@ -19,11 +19,13 @@ import pyarrow.parquet as pq
 from merge_cosim.core.errors import UserError
 from merge_cosim.results.files import (
     csv_rows,
+    csv_table,
     is_whole,
     parquet_options,
     read_json,
     read_schema,
     read_table,
+    readable,
     replacing,
     require,
     write_table,
@@ -233,8 +235,7 @@ class ResultFolder:
 
     def table(self, name: str) -> pd.DataFrame:
         """One of the folder's CSV tables; empty where there is none."""
-        file = self.path / name
-        return pd.read_csv(file, keep_default_na=False, na_values=[""]) if file.is_file() else pd.DataFrame()
+        return csv_table(self.path / name, na_values=[""])
 
     def traffic(self) -> list[dict[str, Any]]:
         """Rows of the finished sweep's table of scenes; none where there were no scenes."""
@@ -262,11 +263,12 @@ class ResultFolder:
     def _support_notes(self) -> list[str]:
         """How many cases begin where a model was not trained, a line per scenario, variation and model."""
         found: dict[tuple[str, ...], tuple[int, int]] = {}
-        for row in csv_rows(self.path / SUMMARY_CSV):
-            outside = row.get("outside_support")
-            if outside and float(outside):
-                key = tuple(row[name] for name in ("scenario", "variation", "site", "source", "model"))
-                found[key] = int(float(outside)), int(row["n"]) + int(row["censored"])
+        with readable(self.path / SUMMARY_CSV):
+            for row in csv_rows(self.path / SUMMARY_CSV):
+                outside = row.get("outside_support")
+                if outside and float(outside):
+                    key = tuple(row[name] for name in ("scenario", "variation", "site", "source", "model"))
+                    found[key] = int(float(outside)), int(row["n"]) + int(row["censored"])
         return [
             f"model {key[-1]}: {outside:,} of {n:,} cases of {' '.join(filter(None, key[:2]))} begin at times to "
             f"arrival that it was not trained on (column in_support)"
@@ -321,7 +323,7 @@ class ResultFolder:
         """The groups of rows of the merged files, in their order; each is of one scenario and variation."""
         whole = self.path / RESULTS
         for path in sorted(whole.glob("*.parquet")) if whole.is_dir() else [whole]:
-            with pq.ParquetFile(path) as file:
+            with pq.ParquetFile(path, page_checksum_verification=True) as file:
                 for number in range(file.num_row_groups):
                     yield file, number
 
@@ -344,7 +346,7 @@ class ResultFolder:
         schema = schema.remove_metadata()
         with (
             replacing(self.path / TRACES) as unfinished,
-            pq.ParquetWriter(unfinished, schema, compression="zstd") as writer,
+            pq.ParquetWriter(unfinished, schema, compression="zstd", write_page_checksum=True) as writer,
         ):
             for file in files:
                 writer.write_table(pq.read_table(file, schema=schema))

@@ -90,12 +90,12 @@ def parse_variation(text: str) -> tuple[str, list[Any]]:
     try:
         first, last, step = (float(part) for part in values.split(":"))
         count = steps_between(first, last, step)
+        whole = all(part == round(part) for part in (first, step))
     except (ValueError, ZeroDivisionError, OverflowError):
         count = -1
     if not 0 <= count < MOST_VALUES:
         raise UserError(
             f"--vary {text}: write NAME=A:B:STEP with A <= B and fewer steps than {MOST_VALUES:,}, or X,Y,Z"
         )
-    whole = all(part == round(part) for part in (first, step))
     steps = [round(first + i * step, 9) for i in range(count + 1)]
     return name, [int(value) for value in steps] if whole else steps

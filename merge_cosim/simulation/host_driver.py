@@ -98,11 +98,13 @@ class DriverBlocks:
 
 
 def _numbers(values: FloatArray, component: Component, seen: Observation) -> FloatArray:
-    n = len(seen.host_station)
-    missing = np.isnan(values)
+    n, who = len(seen.host_station), type(component).__name__
+    try:
+        missing = np.isnan(values)
+    except TypeError:
+        raise UserError(f"{who}: gives {values!r:.60}, where {n} numbers are due") from None
     if missing.shape == (n,) and not np.count_nonzero(missing):  # the two cheapest checks: each cycle makes them
         return values
-    who = type(component).__name__
     if missing.shape != (n,):
         raise UserError(f"{who}: gives shape {missing.shape} where shape {(n,)} is due")
     row = int(missing.argmax())

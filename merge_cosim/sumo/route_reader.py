@@ -61,7 +61,12 @@ def read_sumocfg(file: Path, host: Way = "main") -> tuple[Ramp, Encounters]:
     Raises:
         UserError: A file is missing or no XML, or a car cannot be understood or is routed elsewhere.
     """
-    configuration = Configuration.read(file)
+    return read_pairs(Configuration.read(file), host)
+
+
+def read_pairs(configuration: Configuration, host: Way = "main") -> tuple[Ramp, Encounters]:
+    """The same as `read_sumocfg`, of a configuration that is read already."""
+    file = configuration.file
     ramp = Ramp.load(configuration.net.parent)
     cars: dict[str, list[_Car]] = {role: [] for role in ROLES}
     for entry in _entries(configuration):

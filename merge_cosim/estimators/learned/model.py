@@ -167,11 +167,15 @@ def load_models(name: str | Path) -> list[IntentionModel]:
     return [IntentionModel.load(file) for file in files]
 
 
+MOST = 1e15
+"""Most that a cell can hold: beyond it a 64-bit number is not exact."""
 _BOTH = (Intention.YIELD, Intention.NOT_YIELD)
 
 
 def _speed_model(document: dict[str, Any], lag: str) -> SpeedModel:
     counts = [_dense(document["transitions"][lag][i.name], SPEED_BINS) for i in _BOTH]
+    if not all(count == count.round() for both in counts for count in both.flat):
+        raise ValueError("a count of transitions is not whole")
     return SpeedModel(
         SpeedHistogram(np.stack(counts).astype(np.int64)),
         SpeedGaussian(**{name: _stacked(both) for name, both in document["gaussians"][lag].items()}),
@@ -198,7 +202,9 @@ def _sparse(counts: FloatArray | IntArray) -> list[list[float]]:
 def _dense(entries: list[list[float]], size: int) -> FloatArray:
     counts = np.zeros((size, size))
     for i, j, count in entries:
-        if not 0 <= count < np.inf:
+        if not 0 < count < MOST:
             raise ValueError(f"{count} is no count")
+        if not (i in range(size) and j in range(size)) or counts[int(i), int(j)]:
+            raise ValueError(f"{i}, {j} is no cell, or stands twice")
         counts[int(i), int(j)] = count
     return counts
