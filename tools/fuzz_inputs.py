@@ -52,6 +52,8 @@ class Mine(Estimator):
     def update(self, seen):
         return np.where(seen.host_station > seen.merging_station, 1.0, -1.0) + self.bias
 """
+
+
 def damaged(content: bytes, rng: random.Random) -> bytes:
     """A text or other bytes with one to three changes."""
     for _ in range(rng.randint(1, 3)):
@@ -60,6 +62,7 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
 
 
 def changed_bytes(content: bytes, rng: random.Random) -> bytes:
+    """Some bytes taken out, doubled or replaced."""
     first = rng.randrange(len(content) + 1)
     last = min(len(content), first + rng.choice((0, 1, 8, 200)))
     return content[:first] + rng.choice((b"", rng.randbytes(3), b"\xff", content[first:last] * 2)) + content[last:]
@@ -120,7 +123,9 @@ def episode_table() -> pa.Table:
     frames = [frame for _ in (0, 1) for frame in range(30)]
     cars = [car for car in (0, 1) for _ in range(30)]
     stations = [10.0 * (not car) + 1.5 * frame for car, frame in zip(cars, frames, strict=True)]
-    return pa.table({"episode": [50] * 60, "frame": frames, "car": cars, "station_m": stations, "speed_m_s": [15.0] * 60})
+    return pa.table(
+        {"episode": [50] * 60, "frame": frames, "car": cars, "station_m": stations, "speed_m_s": [15.0] * 60}
+    )
 
 
 def trajectory_table() -> pa.Table:

@@ -11,6 +11,7 @@ import tomllib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 from pydantic import BaseModel
 
+from merge_cosim.api.results import Results
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ngsim.pairing.tracks import Tracks
@@ -47,7 +49,9 @@ def trajectories(reading: Reading, rows: Iterable[dict[str, str]]) -> None:
     every = set()
     rows = list(rows)
     count, clock = len(rows), dict[int, int]()
-    for origin in sorted(set() if reading.elsewhere else set(map(_origin, rows))):  # origins up to a minute apart are one recording
+    for origin in sorted(
+        set() if reading.elsewhere else set(map(_origin, rows))
+    ):  # origins up to a minute apart are one recording
         near = [start for start in clock.values() if 0 <= origin - start <= 60_000]
         clock[origin] = max(near, default=origin)
     for row in rows:
@@ -118,7 +122,8 @@ def text_rows(content: bytes, names: tuple[str, ...] | None) -> Iterator[dict[st
 
 def parquet_rows(file: Path) -> Iterator[dict[str, str]]:
     """The rows of a Parquet file, as texts."""
-    table = pq.ParquetFile(file).read()
+    held = pq.ParquetFile(file)
+    table = held.read([name for name in held.schema_arrow.names if name.lower() in map(str.lower, FIELDS)])
     columns = {name.lower(): table.column(at).to_pylist() for at, name in enumerate(table.column_names)}
     for values in zip(*(columns[name.lower()] for name in FIELDS), strict=True):
         yield dict(zip(FIELDS, map(str, values), strict=True))
@@ -149,7 +154,7 @@ def leaves(document: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
 
 def same_leaves(taken: Any, document: Any) -> None:
     """Every value of a document must be among what was taken: the same number, not a near one, and not nothing."""
-    found = {path: value for path, value in leaves(taken)}
+    found = dict(leaves(taken))
     for path, value in leaves(document):
         name, other = ".".join(path), found.get(path, Wrong)
         if isinstance(value, float) and not math.isfinite(value):
@@ -177,17 +182,25 @@ def grid(encounters: Encounters, file: Path) -> None:
     same("encounters", len(encounters), count)
 
 
+def xml(file: Path) -> ElementTree.Element:
+    """Root of an XML file in whatever encoding it names."""
+    content = file.read_bytes()
+    named = re.match(rb"""<\?xml[^>]*encoding=["']([^"']+)["'][^>]*\?>""", content)
+    text = content.decode(named[1].decode() if named else "utf-8-sig")
+    return ElementTree.fromstring(re.sub(r"^<\?xml[^>]*\?>", "", text))
+
+
 def ramp(found: Ramp, net: Path, definition: Path) -> None:
     """Compare a ramp with its two files: the edges' lengths, one after the other, from the gore."""
     told = tomllib.loads(definition.read_text())
     same("speed limit", found.speed_limit, told["speed_limit"])
     same("merging point", found.merging_point, told["merging_point"])
-    edges = {edge.get("id"): edge.findall("lane") for edge in ElementTree.parse(net).getroot().iter("edge")}
+    edges = {edge.get("id"): edge.findall("lane") for edge in xml(net).iter("edge")}
     for key, lanes, sections in (("main", "host_lane", found.main), ("ramp", "merging_lane", found.ramp)):
         same(f"edges of {key}", [one.edge for one in sections], told[key])
         same(f"lanes of {key}", [one.lane for one in sections], told[lanes])
         _lengths(sections, edges)
-    own = [edge for edge in told["main"][: told["main"].index(told["gore"])]]
+    own = told["main"][: told["main"].index(told["gore"])]
     same("gore", round(found.main[0].start, 6), -round(sum(float(edges[one][0].get("length")) for one in own), 6))
 
 
@@ -199,18 +212,20 @@ def _lengths(sections: tuple[Section, ...], edges: dict[str | None, list[Element
             raise Wrong(f"edge {one.edge} has the length {length}")
         same(f"length of {one.edge}", one.length, length)
         same(f"lane {one.lane} of {one.edge} is there", one.lane < len(own), True)
-    for before, after in zip(sections, sections[1:], strict=False):
+    for before, after in pairwise(sections):
         same(f"start of {after.edge}", round(after.start, 6), round(before.start + before.length, 6))
 
 
 def routes(encounters: Encounters, file: Path, found: Ramp) -> None:
     """Compare encounters with the route file: the cars with a role, in order, and where they start."""
-    root = ElementTree.fromstring(file.read_bytes())
+    root = xml(file)
     types = {kind.get("id"): kind for kind in root.iter("vType")}
     cars: dict[str, list[tuple[str, float, float]]] = {"host": [], "merging": []}
     for vehicle in root.iter("vehicle"):
         kind = types.get(vehicle.get("type", ""))
-        told = {p.get("key"): p.get("value") for part in (kind, vehicle) if part is not None for p in part.iter("param")}
+        told = {
+            p.get("key"): p.get("value") for part in (kind, vehicle) if part is not None for p in part.iter("param")
+        }
         if "merge-cosim.role" in told:
             own = vehicle.find("route")
             named = [one for one in root.iter("route") if one.get("id") == vehicle.get("route")]
@@ -298,7 +313,22 @@ def _value(task: Task, name: str) -> Any:
     return value
 
 
-CONDITIONS = ("failed", "stuck", "delay_s > {:.1f}", "host_speed_0 >= {:.0f}", "method == 'acc'", "case != 'x'", "n == 0")
+def results(taken: tuple[pd.DataFrame, pd.DataFrame, Any], whole: Results, summary: Path) -> None:
+    """What was taken from a damaged folder must be what the whole one holds."""
+    same("rows", taken[0].equals(whole.rows), True)
+    same("traces", taken[1].equals(whole.traces), True)
+    same("summary", taken[2], json.loads(summary.read_text()))
+
+
+CONDITIONS = (
+    "failed",
+    "stuck",
+    "delay_s > {:.1f}",
+    "host_speed_0 >= {:.0f}",
+    "method == 'acc'",
+    "case != 'x'",
+    "n == 0",
+)
 
 
 def condition(rng: random.Random) -> str:

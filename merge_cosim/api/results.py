@@ -298,7 +298,9 @@ def _constant_part(condition: str) -> bool:
         parts = list(ast.walk(ast.parse(condition.strip(), mode="eval")))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False  # pandas tells
-    negated = (one.operand for one in parts if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.Not | ast.Invert))
+    negated = (
+        one.operand for one in parts if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.Not | ast.Invert)
+    )
     return not all(any(isinstance(part, ast.Name) for part in ast.walk(one)) for one in negated)
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
-from merge_cosim.core.units import AnyArray, FloatArray
+from merge_cosim.core.units import MOST_LENGTH, MOST_SPEED, AnyArray, FloatArray
 
 NEEDED = ("host_station", "host_speed", "merging_station", "merging_speed")
 OPTIONAL = {"host_length": 5.0, "merging_length": 5.0, "merge_position": 0.0}
@@ -46,12 +46,12 @@ def _numbers(frame: pd.DataFrame, name: str) -> FloatArray:
     values = pd.to_numeric(frame[name], errors="coerce").to_numpy(dtype=np.float64)
     wrong = ~np.isfinite(values)
     if name in NOT_NEGATIVE:
-        wrong |= values < 0
+        wrong |= (values < 0) | (values > MOST_SPEED)
     if name in POSITIVE:
-        wrong |= values <= 0
+        wrong |= (values <= 0) | (values > MOST_LENGTH)
     if wrong.any():
         row = int(np.argmax(wrong))
-        wanted = "a positive number" if name in POSITIVE else "a number"
-        wanted += ", 0 or more" if name in NOT_NEGATIVE else ""
+        wanted = f"a positive number, at most {MOST_LENGTH:g}" if name in POSITIVE else "a number"
+        wanted += f", 0 to {MOST_SPEED:g}" if name in NOT_NEGATIVE else ""
         raise UserError(f"column '{name}', row {row}: {frame[name].tolist()[row]!r} must be {wanted}")
     return values

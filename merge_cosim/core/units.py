@@ -26,6 +26,9 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 AnyArray = NDArray[Any]
 
+MOST_SPEED, MOST_LENGTH = 100.0, 100.0
+"""Beyond these a car's initial speed [m/s] or its length [m] is a slip."""
+
 SpeedLimit = Annotated[float, Field(gt=0, le=100)]
 """A speed limit [m/s]; beyond 100 it is a slip."""
 

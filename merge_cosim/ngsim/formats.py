@@ -195,7 +195,7 @@ def sources(path: Path, layout: Layout = NGSIM) -> list[Source]:
         raise UserError(f"{path}: no such file") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (pa.ArrowInvalid, zipfile.BadZipFile):
+    except (pa.ArrowInvalid, UnicodeDecodeError, zipfile.BadZipFile):  # a column's name may be no text
         raise UserError(f"{path}: damaged or cut short: download or copy it again") from None
     return [_text(path, layout)]
 

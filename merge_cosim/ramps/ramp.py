@@ -234,7 +234,20 @@ def read_net(path: Path) -> sumolib.net.Net:
         raise UserError(f"{path}: no such net; build it with: merge-cosim ramp build {path.parent}")
     if (root := root_element(path)).tag != "net":
         raise UserError(f"{path}: its root is <{root.tag}>, not <net>; give a .net.xml")
+    return parsed_net(path, path)
+
+
+def parsed_net(path: Path, named: Path) -> sumolib.net.Net:
+    """Take a net apart; `named` is the file that error lines speak of.
+
+    Raises:
+        UserError: It cannot be, or lacks a junction that an edge names.
+    """
     try:
-        return sumolib.net.readNet(str(path))
+        net = sumolib.net.readNet(str(path))
     except Exception as error:  # sumolib passes on whatever its parser meets
-        raise UserError(f"{path}: not a SUMO net: {error}") from None
+        raise UserError(f"{named}: not a SUMO net: {error}") from None
+    for node in net.getNodes():
+        if node.getCoord3D() is None:
+            raise UserError(f"{named}: not a whole SUMO net: it has no junction '{node.getID()}', which an edge names")
+    return net

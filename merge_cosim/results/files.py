@@ -72,8 +72,10 @@ def require(file: Path, held: pa.Schema, expected: Iterable[pa.Field]) -> None:
     Raises:
         UserError: It does.
     """
+    with readable(file):
+        fields = [(field.name, field.type) for field in held]
     for column in expected:
-        types = [field.type for field in held if field.name == column.name]
+        types = [kind for name, kind in fields if name == column.name]
         if types != [column.type] and not (types == [pa.large_string()] and column.type == pa.string()):
             raise UserError(f"{file}: damaged (no column '{column.name}' of type {column.type}); run the sweep again")
 
@@ -115,8 +117,10 @@ def write_table(file: Path, rows: pa.Table) -> None:
 
 
 def parquet_options(schema: pa.Schema) -> dict[str, Any]:
-    """How tables are written: texts by dictionary, as they repeat; numbers as they are, in half the time;
-    with checksums, so that a changed byte is noticed when they are read."""
+    """How tables are written: texts by dictionary, as they repeat; numbers as they are, in half the time.
+
+    With checksums, so that a changed byte is noticed when they are read.
+    """
     texts = [column.name for column in schema if column.type == pa.string() and column.name != "case"]
     return {"compression": "zstd", "use_dictionary": texts, "write_page_checksum": True}
 

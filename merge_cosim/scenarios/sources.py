@@ -19,6 +19,7 @@ from pydantic import (
     model_validator,
 )
 
+from merge_cosim.core.units import MOST_SPEED
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.simulation.worlds.meetings import Attention
 from merge_cosim.sumo.demand import Demand
@@ -69,6 +70,8 @@ R = TypeVar("R", bound=Range)
 def _forwards(speeds: R) -> R:
     if speeds.first < 0:
         raise ValueError("a speed must not be negative")
+    if speeds.last > MOST_SPEED:
+        raise ValueError(f"a speed must be at most {MOST_SPEED:g} m/s")
     return speeds
 
 

@@ -12,7 +12,7 @@ from lxml import etree
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.units import TOLERANCE
+from merge_cosim.core.units import MOST_LENGTH, MOST_SPEED, TOLERANCE
 from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.sumo.configuration import DEFAULT_TYPE, Configuration, parse
 from merge_cosim.sumo.lane_map import LaneMap, LanePosition
@@ -189,18 +189,20 @@ def _car(entry: _Entry) -> _Car:
         route=tuple(entry.edges.split()),
         lane=vehicle.get("departLane"),
         position=_number(vehicle.get("departPos"), "departPos", where),
-        speed=_number(vehicle.get("departSpeed"), "departSpeed", where, least=0.0),
-        length=_number(entry.length, "length", where, least=0.1),
+        speed=_number(vehicle.get("departSpeed"), "departSpeed", where, least=0.0, most=MOST_SPEED),
+        length=_number(entry.length, "length", where, least=0.1, most=MOST_LENGTH),
         merge_position=None if merge_position is None else _number(merge_position, MERGE_POSITION, where),
     )
 
 
-def _number(text: str | None, name: str, where: str, least: float = -math.inf) -> float:
+def _number(text: str | None, name: str, where: str, least: float = -math.inf, most: float = math.inf) -> float:
     if not _is_number(text):
         raise UserError(f"{where}: {name} is '{text or ''}'; an encounter needs a number")
     value = float(text or "")
     if value < least:
         raise UserError(f"{where}: {name} is {text}; it must be at least {least:g}")
+    if value > most:
+        raise UserError(f"{where}: {name} is {text}; it must be at most {most:g}")
     return value
 
 

@@ -22,7 +22,7 @@ def test_columns_that_are_absent_get_their_usual_value():
     ("change", "message"),
     [
         ({"host_sped": 1.0}, "unknown column 'host_sped'; did you mean 'host_speed'"),
-        ({"host_speed": [20.0, -1.0]}, "column 'host_speed', row 1: .* must be a number, 0 or more"),
+        ({"host_speed": [20.0, -1.0]}, "column 'host_speed', row 1: .* must be a number, 0 to 100"),
         ({"host_length": 0.0}, "column 'host_length', row 0: .* must be a positive number"),
         ({"merging_station": [np.nan, 1.0]}, "column 'merging_station', row 0: nan must be a number"),
         ({"case": "a"}, "column 'case': 'a' stands there twice"),

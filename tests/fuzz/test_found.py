@@ -1,14 +1,23 @@
 """What the long run has found: each damaged input once more, with the line that it gets."""
 
+import json
 import shutil
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from command import refused
-from fuzz_inputs import CONFIG, ROUTES, trajectories
+import pytest
+from command import merge_cosim, refused
+from fuzz_inputs import CONFIG, GRID, PLUGIN, ROUTES, trajectories, trajectory_table
 
+from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
+from merge_cosim.estimators.learned.model import MODELS, IntentionModel
+from merge_cosim.ngsim.sites import read_site
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.view import netedit_view
+from merge_cosim.results.store import ResultFolder
+from merge_cosim.scenarios.settings import parse_variation
 
 
 def test_a_short_row_with_bytes_that_are_no_text(tmp_path: Path) -> None:
@@ -41,6 +50,14 @@ def test_columns_of_other_kinds_and_twice(tmp_path: Path) -> None:
     assert "t.parquet: its columns cannot be taken as trajectories" in refused(*command, cwd=tmp_path)
 
 
+def test_a_column_whose_name_is_no_text(tmp_path: Path) -> None:
+    pq.write_table(trajectory_table(), tmp_path / "t.parquet", store_schema=False)
+    content = (tmp_path / "t.parquet").read_bytes()
+    (tmp_path / "t.parquet").write_bytes(content.replace(b"Lane_ID", b"Lane\xffID"))
+    line = refused("ngsim", "import", "t.parquet", "--out", "o", cwd=tmp_path)
+    assert "t.parquet: damaged or cut short" in line
+
+
 def test_a_net_whose_path_has_no_connection(tmp_path: Path) -> None:
     shutil.copytree(shipped("sumo_nets") / "designed", tmp_path, dirs_exist_ok=True)
     net = tmp_path / "designed.net.xml"
@@ -50,3 +67,142 @@ def test_a_net_whose_path_has_no_connection(tmp_path: Path) -> None:
     (tmp_path / "my.sumocfg").write_text(CONFIG)
     line = refused("run", "my.sumocfg", "--case", "h0_m0", "--method", "acc", cwd=tmp_path)
     assert "SUMO cannot drive the ramp's paths: Vehicle 't0.merging' has no valid route" in line
+
+
+def test_a_column_of_true_and_false_holds_no_numbers(tmp_path: Path) -> None:
+    table = trajectory_table()
+    pq.write_table(table.set_column(13, "Lane_ID", pa.array([True] * len(table))), tmp_path / "t.parquet")
+    line = refused("ngsim", "import", "t.parquet", "--out", "o", cwd=tmp_path)
+    assert line.endswith("t.parquet: Lane_ID holds true and false, not numbers")
+
+
+@pytest.mark.parametrize(
+    ("stands", "written", "fault"),
+    [
+        ("gore = 613.0", "gore = true", "recording.gore: Input should be a valid number"),
+        ("ramp = [6, 7]", "ramp = [true, 7]", "lanes.ramp.0: Input should be a valid integer"),
+        ("6_453_200.0]", "inf]", r"recording.global_x.1: Input should be a finite number"),
+        ("[1_871_450.0", "[nan", r"recording.global_y.0: Input should be a finite number"),
+    ],
+)
+def test_a_site_with_what_is_no_number(tmp_path: Path, stands: str, written: str, fault: str) -> None:
+    text = (shipped("sumo_nets") / "us101" / "site.toml").read_text()
+    assert stands in text
+    (tmp_path / "site.toml").write_text(text.replace(stands, written))
+    with pytest.raises(UserError, match=rf"site\.toml: {fault}"):
+        read_site(tmp_path)
+
+
+def test_a_variation_in_infinite_steps() -> None:
+    with pytest.raises(UserError, match="write NAME=A:B:STEP"):
+        parse_variation("acc.headway=1:2:inf")
+
+
+@pytest.mark.parametrize(
+    ("stands", "written"),
+    [
+        ('length="500.00" width', 'length="inf" width'),
+        (
+            '<edge id="main_in"',
+            '<edge id="main_in"><lane id="main_in_0" index="0" speed="1" length="2" shape="0,0 1,0"/></edge>'
+            '<edge id="main_in"',
+        ),
+    ],
+)
+def test_a_net_with_lengths_that_are_none(tmp_path: Path, stands: str, written: str) -> None:
+    folder = shipped("sumo_nets") / "designed"
+    net = (folder / "designed.net.xml").read_text()
+    (tmp_path / "designed.net.xml").write_text(net.replace(stands, written, 1))
+    shutil.copy(folder / "ramp.toml", tmp_path)
+    with pytest.raises(
+        UserError, match=r"ramp\.toml: main: in the net designed\.net\.xml the lanes of edge 'main_in' are"
+    ):
+        Ramp.load(tmp_path)
+
+
+@pytest.mark.parametrize("cell", [[-1, 3, 1], [0, 30, 1], [0.5, 3, 1], [11, 15, 1], [0, 0, 1e16], [0, 0, 0]])
+def test_a_model_with_a_cell_that_is_none(tmp_path: Path, cell: list[float]) -> None:
+    document = json.loads((MODELS / "us101-surrogate.json").read_text())
+    document["arrivals"]["NOT_YIELD"].append(cell)
+    file = tmp_path / "m.json"
+    file.write_text(json.dumps(document))
+    with pytest.raises(UserError, match=r"m\.json: not a merge-cosim model"):
+        IntentionModel.load(file)
+
+
+def test_a_model_with_a_broken_count(tmp_path: Path) -> None:
+    document = json.loads((MODELS / "us101-surrogate.json").read_text())
+    document["transitions"]["1"]["YIELD"][0][2] = 1.5
+    (tmp_path / "m.json").write_text(json.dumps(document))
+    with pytest.raises(UserError, match="a count of transitions is not whole"):
+        IntentionModel.load(tmp_path / "m.json")
+
+
+def test_a_view_that_is_no_xml(tmp_path: Path) -> None:
+    (tmp_path / "view.xml").write_bytes(b"<viewsettings \xd7")
+    with pytest.raises(UserError, match=r"view\.xml: not XML"):
+        netedit_view(tmp_path, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("stands", "written", "fault"),
+    [
+        (
+            "def update(self, seen)",
+            "def update(seen)",
+            "Mine.update: too many positional arguments; it is called as update(",
+        ),
+        ("def update", "def updates", "Mine: it has no method 'update', which every estimator needs"),
+        ("return np.where", "return str #", "Mine: gives <class 'str'>, where 1 numbers are due"),
+    ],
+)
+def test_a_plugin_with_a_method_that_does_not_fit(tmp_path: Path, stands: str, written: str, fault: str) -> None:
+    (tmp_path / "p.py").write_text(PLUGIN.replace(stands, written))
+    case = ("--case", "d+0_h15_m15", "--method", "mine", "--plugin", "p.py", "--world", "closed-form")
+    assert fault in refused("run", "designed-2", *case, cwd=tmp_path)
+
+
+def test_a_result_folder_with_one_other_byte(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(GRID)
+    words = ("--method", "acc", "--world", "closed-form", "--jobs", 1, "--out", "out")
+    done = merge_cosim("sweep", "s.toml", *words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    folder = ResultFolder(tmp_path / "out")
+    for name, read in (("results.parquet", folder.results), ("traces.parquet", folder.traces)):
+        file = tmp_path / "out" / name
+        content = bytearray(file.read_bytes())
+        page = pq.read_metadata(file).row_group(0).column(2)
+        content[page.dictionary_page_offset + page.total_compressed_size - 1] ^= 1  # the last byte of its data
+        file.write_bytes(content)
+        with pytest.raises(UserError, match=rf"{name}: damaged"):
+            read()
+    for content in (b"scenario,n\nx,\xff", b"scenario,n\nx", b"outside_support,n\n1,y"):
+        (tmp_path / "out/summary.csv").write_bytes(content)
+        with pytest.raises(UserError, match=r"summary\.csv: damaged"):
+            folder.note_lines()
+
+
+def test_a_condition_with_a_part_of_constants(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(GRID)
+    words = ("--method", "acc", "--world", "closed-form", "--jobs", 1, "--out", "out")
+    assert merge_cosim("sweep", "s.toml", *words, cwd=tmp_path).returncode == 0
+    line = refused("cases", "out", "--where", "stuck | (not -1 != 'x')", cwd=tmp_path)
+    assert "a part of it names no column; write one such as" in line
+
+
+def test_a_net_without_a_junction(tmp_path: Path) -> None:
+    net = (shipped("sumo_nets") / "us101" / "us101.net.xml").read_text().splitlines()
+    (tmp_path / "my.net.xml").write_text("\n".join(line for line in net if '<junction id="main_end"' not in line))
+    line = refused("ramp", "describe", "my.net.xml", cwd=tmp_path)
+    assert "my.net.xml: not a whole SUMO net: it has no junction 'main_end', which an edge names" in line
+
+
+def test_a_car_too_fast_to_be_one(tmp_path: Path) -> None:
+    shutil.copytree(shipped("sumo_nets") / "designed", tmp_path, dirs_exist_ok=True)
+    (tmp_path / "my.rou.xml").write_text(ROUTES.replace('departSpeed="18"', 'departSpeed="1e20"'))
+    (tmp_path / "my.sumocfg").write_text(CONFIG)
+    line = refused("run", "my.sumocfg", "--case", "h0_m0", "--method", "acc", cwd=tmp_path)
+    assert "my.rou.xml:6: vehicle 'm0': departSpeed is 1e20; it must be at most 100" in line
+    (tmp_path / "s.toml").write_text(GRID.replace("to = 25, step = 10", "to = 1e20, step = 1e20"))
+    line = refused("run", "s.toml", "--case", "x", "--method", "acc", cwd=tmp_path)
+    assert "a speed must be at most 100 m/s" in line

@@ -3,50 +3,78 @@
 The long run is `python tools/fuzz.py --inputs N --seed S`.
 """
 
+import os
 import random
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
-from fuzz import fuzz, run
-from fuzz_inputs import TARGETS, Target
+from fuzz import GOOD, fuzz
+from fuzz_oracles import Wrong
+from fuzz_targets import TARGETS, Target
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import merge_cosim.api.sweep  # so that every copy of this process has it
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.toml_file import Table, read_toml
 from merge_cosim.core.xml_file import read_xml, root_element
 from merge_cosim.scenarios.settings import parse_setting, parse_value, parse_variation
 
 SEED = 14
-assert merge_cosim.api.sweep
+SLOW = 3
+"""Targets of a smaller share start SUMO or a whole command for each input."""
 
 
-@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
-def test_a_good_input_is_right_and_damaged_ones_are_refused_in_one_line(
-    target: Target, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MERGE_COSIM_CACHE", str(tmp_path / "cache"))
-    for number in range(2):
-        folder = tmp_path / f"{number}"
-        folder.mkdir()
-        found = run(target.make(folder, random.Random(f"{SEED} {target.name} {number}")), folder)
-        assert found.kind in ("right", "refused"), found
 
 
-def test_what_a_fault_is_called(tmp_path: Path) -> None:
-    """The tool itself: it tells a traceback, and what is right."""
-    plugin = tmp_path / "p.py"
-    plugin.write_text("import os; os.kill(os.getpid(), 9)")
-    run_case = ("run", "designed-2", "--case", "d+0_h15_m15", "--method", "acc", "--world", "closed-form")
-    assert run((*run_case, "--plugin", "p.py"), tmp_path).kind == "crash"
-    plugin.write_text("while True: pass")
-    assert run((*run_case, "--plugin", "p.py"), tmp_path, limit=3.0).kind == "hang"
-    plugin.write_text("1 / 0")
-    assert run((*run_case, "--plugin", "p.py"), tmp_path).kind == "refused"
-    assert run(run_case, tmp_path).kind == "right"
-    assert sum(fuzz([one for one in TARGETS if one.name == "set"], 1, SEED).values()) == 1
+def test_damaged_inputs_are_right_or_refused(tmp_path: Path) -> None:
+    quick = [one for one in TARGETS if one.share > SLOW]
+    counts = fuzz(quick, 300, SEED, tmp_path)
+    assert sum(counts.values()) == 300
+    assert {kind for _, kind in counts} == set(GOOD), list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("target", [one for one in TARGETS if one.share <= SLOW], ids=lambda target: target.name)
+def test_a_damaged_input_of_a_whole_command(target: Target, tmp_path: Path) -> None:
+    assert set(fuzz([target], 1, SEED, tmp_path)) <= {(target.name, kind) for kind in GOOD}, list(tmp_path.iterdir())
+
+
+def _raises(error: Exception) -> None:
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("kind", "read"),
+    [
+        ("right", lambda: None),
+        ("refused", lambda: _raises(UserError("a.toml: no such key"))),
+        ("line", lambda: _raises(UserError("no such key"))),
+        ("wrong", lambda: partial(_raises, Wrong("2 was taken as 3"))),
+        ("traceback", lambda: _raises(KeyError("x"))),
+        ("process", lambda: subprocess.Popen([sys.executable, "-c", "pass"]) and None),
+        ("crash", lambda: os.kill(os.getpid(), 9)),
+        ("hang", lambda: time.sleep(60)),
+    ],
+)
+def test_what_a_fault_is_called(kind: str, read: Callable[[], object], tmp_path: Path) -> None:
+    target = Target("mine", lambda folder, rng: read, r"a\.toml")
+    assert fuzz([target], 2, SEED, tmp_path, limit=0.5) == {("mine", kind): 2}
+
+
+def test_an_input_can_be_made_again(tmp_path: Path) -> None:
+    target = next(one for one in TARGETS if one.name == "scenario")
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        target.make(tmp_path / folder, random.Random(f"{SEED} scenario 7"))
+    assert (tmp_path / "a/s.toml").read_bytes() == (tmp_path / "b/s.toml").read_bytes()
 
 
 @settings(max_examples=50)

@@ -15,6 +15,7 @@ from lxml import etree
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.create.new import merging_point_source
 from merge_cosim.ramps.infer import Course, Joint, course, joint_of, joints
+from merge_cosim.ramps.ramp import parsed_net
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,7 @@ def read_source(path: Path, named: Path) -> sumolib.net.Net:
     if root.tag != "net":
         more = "an extract of OpenStreetMap goes with --from-osm" if root.tag == "osm" else "give a .net.xml"
         raise UserError(f"{named}: its root is <{root.tag}>, not <net>; {more}")
-    try:
-        net = sumolib.net.readNet(str(path))
-    except Exception as error:  # sumolib passes on whatever its parser meets
-        raise UserError(f"{named}: not a SUMO net: {error}") from None
+    net = parsed_net(path, named)
     for edge in net.getEdges():
         edge._name = html.unescape(edge.getName() or "")  # netconvert escapes names of OpenStreetMap twice
     return net
