@@ -4,15 +4,21 @@ import hashlib
 from copy import deepcopy
 from pathlib import Path
 
+import sumolib
 from lxml import etree
 
-from merge_cosim.core.files import cache_folder, from_cache
+from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import cache_folder, from_cache, shipped
+from merge_cosim.core.programs import run_program
 from merge_cosim.core.xml_file import read_xml
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.sumo.xml import write_xml
 
 SPACING = 30.0
 """Free room between two tiles [m], for the eye only: tiles share no node."""
+
+READING = 60.0
+"""Longest time for SUMO to read a net [s]."""
 
 _REFERENCES = ("id", "from", "to", "incLanes")
 """Attributes that hold one id or several, and so get the tile's prefix."""
@@ -35,6 +41,9 @@ def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
         ramp: The ramp to copy.
         count: Number of tiles, at least 1.
         whole: Keep all edges and lanes, and the right of way, for a scene with other traffic.
+
+    Raises:
+        UserError: The ramp's net is not whole, or SUMO cannot read it.
     """
     source = ramp.net.read_bytes()
     ingredients = source + repr((ramp.main, ramp.ramp, count, whole)).encode() + Path(__file__).read_bytes()
@@ -43,13 +52,27 @@ def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
 
     def make(file: Path) -> None:
         net = read_xml(ramp.net, blanks=False)
-        _leave_out_internal(net)
-        if not whole:
-            _reduce(net, ramp)
-        _multiply(net, count)
+        try:
+            _leave_out_internal(net)
+            if not whole:
+                _reduce(net, ramp)
+            _multiply(net, count)
+        except ValueError as error:
+            raise UserError(f"{ramp.net}: not a whole SUMO net: {error}") from None
         write_xml(file, net)
+        if shipped("sumo_nets") not in ramp.net.parents:
+            _try(file, ramp.net)
 
     return from_cache(target, make)
+
+
+def _try(net: Path, named: Path) -> None:
+    """Have a SUMO of its own read a net: a net that it cannot bear would end this process without a word."""
+    command = [sumolib.checkBinary("sumo"), "--net-file", str(net), "--no-internal-links", "--end", "0"]
+    done = run_program(command, READING, named)
+    if done.returncode:
+        lines = [line for line in done.stderr.decode(errors="replace").splitlines() if line.startswith("Error")]
+        raise UserError(f"{named}: SUMO cannot read it: {' '.join(lines) or 'it ends by signal'}")
 
 
 def _leave_out_internal(net: etree._Element) -> None:
@@ -76,8 +99,10 @@ def _reduce(net: etree._Element, ramp: Ramp) -> None:
             net.remove(edge)
             continue
         nodes |= {edge.get("from"), edge.get("to")}
-        for lane in edge.findall("lane"):
-            if int(lane.get("index", "")) > last:
+        for number, lane in enumerate(edge.findall("lane")):
+            if int(lane.get("index", "")) != number:
+                raise ValueError(f"the lanes of edge '{edge.get('id')}' are not numbered 0, 1, ...")
+            if number > last:
                 edge.remove(lane)
                 continue
             lanes.add(lane.get("id"))
@@ -99,7 +124,8 @@ def _reduce(net: etree._Element, ramp: Ramp) -> None:
 def _multiply(net: etree._Element, count: int) -> None:
     """Put `count` copies of a net's content in its place, side by side."""
     location = net.find("location")
-    assert location is not None
+    if location is None:
+        raise ValueError("it has no <location>")
     west, south, east, north = map(float, location.get("convBoundary", "").split(","))
     pitch = north - south + SPACING
     location.set("convBoundary", f"{west:.2f},{south:.2f},{east:.2f},{north + (count - 1) * pitch:.2f}")

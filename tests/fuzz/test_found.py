@@ -1,6 +1,7 @@
 """What the long run has found: each damaged input once more, with the line that it gets."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import netedit_view
 from merge_cosim.results.store import ResultFolder
 from merge_cosim.scenarios.settings import parse_variation
+from merge_cosim.sumo.tiles import tile_net
 
 
 def test_a_short_row_with_bytes_that_are_no_text(tmp_path: Path) -> None:
@@ -206,3 +208,22 @@ def test_a_car_too_fast_to_be_one(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(GRID.replace("to = 25, step = 10", "to = 1e20, step = 1e20"))
     line = refused("run", "s.toml", "--case", "x", "--method", "acc", cwd=tmp_path)
     assert "a speed must be at most 100 m/s" in line
+
+
+@pytest.mark.parametrize(
+    ("stands", "written", "fault"),
+    [
+        ('id="ramp_0" index="0"', 'id="ramp_0" index="3"', "the lanes of edge 'ramp' are not numbered 0, 1, ..."),
+        ("<location ", "<place ", "it has no <location>"),
+        ("-500.00,-43.58,1500.00,0.00", "-500.00,1500.00", "not enough values to unpack"),
+        ('<lane id="ramp_0"', '<lane id="main_in_0"', "SUMO cannot read it: Error"),
+    ],
+)
+def test_a_net_that_sumo_cannot_bear(tmp_path: Path, stands: str, written: str, fault: str) -> None:
+    shutil.copytree(shipped("sumo_nets") / "designed", tmp_path, dirs_exist_ok=True)
+    net = tmp_path / "designed.net.xml"
+    text = net.read_text()
+    assert stands in text
+    net.write_text(text.replace(stands, written, 1))
+    with pytest.raises(UserError, match=rf"designed\.net\.xml: .*{re.escape(fault)}"):
+        tile_net(Ramp.load(tmp_path), 2)
