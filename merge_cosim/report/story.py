@@ -14,7 +14,7 @@ FAILURES = {
 
 
 def story(row: Mapping[str, Any]) -> list[str]:
-    """Tell a result row, or the facts of a whole scene, in five lines."""
+    """Tell a result row, or the facts of a whole scene, in five lines, and one for each broken invariant."""
     known = {name: value for name, value in row.items() if value is not None and value == value}
     return _of_pair(known) if "failed" in known else _of_scene(known)
 
@@ -29,6 +29,7 @@ def _of_pair(row: Mapping[str, Any]) -> list[str]:
         f"merge   {_order(row)}",
         f"result  {_outcome(row)}",
         f"cost    {_cost(row)}",
+        *row.get("broken", []),
     ]
 
 

@@ -31,12 +31,13 @@ from merge_cosim.results.files import (
     write_table,
     write_text,
 )
+from merge_cosim.results.invariants import Checked, joined, lines
 from merge_cosim.results.schema import KEY, SCHEMA, SCHEMA_VERSION, VERSION_KEY
 from merge_cosim.scoring.tracks import RECORDED
 from merge_cosim.simulation.recording import trace_of
 
-SCENE_FACTS = b"merge_cosim_scenes"
-"""Metadata of a part: the facts of the scenes that its rows come from (JSON)."""
+SCENE_FACTS, INVARIANTS = b"merge_cosim_scenes", b"merge_cosim_invariants"
+"""Metadata of a part: the facts of the scenes that its rows come from, and what its invariants came to (JSON)."""
 SCENES_CSV, TRAFFIC_CSV, NOTES_CSV = "scenes.csv", "traffic.csv", "notes.csv"
 STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV = "strata.csv", "belief.csv", "calibration.csv"
 ENSEMBLE_CSV, RIVALS_CSV = "ensemble.csv", "rivals.csv"
@@ -156,7 +157,7 @@ class ResultFolder:
         self._parts.mkdir(exist_ok=True)
         for part in self._parts.glob("*.parquet"):
             part.unlink()
-        self.add(f"{BEFORE}-scenes", with_scene_facts(SCHEMA.empty_table(), self._scene_facts()))
+        self.add(f"{BEFORE}-scenes", with_facts(SCHEMA.empty_table(), self._scene_facts(), self._invariants()))
         for number, (file, group) in enumerate(self._row_groups()):
             rows = file.read_row_group(group)
             self.add(f"{BEFORE}-{number:05d}", rows.filter(pc.not_equal(rows["method"], drop)))
@@ -228,9 +229,22 @@ class ResultFolder:
 
     def scenes(self) -> list[dict[str, Any]]:
         """Facts of the scenes that the stored parts come from, in their order."""
-        found: list[dict[str, Any]] = []
+        return [fact for facts in self._of_parts(SCENE_FACTS) for fact in facts]
+
+    def invariants(self) -> dict[str, Any]:
+        """What the invariants of all stored parts came to."""
+        return joined(self._of_parts(INVARIANTS))
+
+    def _of_parts(self, key: bytes) -> Iterator[Any]:
+        """What the metadata of the stored parts hold, in their order."""
         for file in sorted(self._parts.glob("*.parquet")):
-            found += json.loads((pq.read_schema(file).metadata or {}).get(SCENE_FACTS, b"[]"))
+            metadata = pq.read_schema(file).metadata or {}
+            if key in metadata:
+                yield json.loads(metadata[key])
+
+    def _invariants(self) -> dict[str, Any]:
+        """What the invariants of a finished sweep came to."""
+        found: dict[str, Any] = self.read_json(MANIFEST).get("invariants") or joined(())
         return found
 
     def table(self, name: str) -> pd.DataFrame:
@@ -242,7 +256,7 @@ class ResultFolder:
         return csv_rows(self.path / TRAFFIC_CSV)
 
     def _scene_facts(self) -> list[dict[str, Any]]:
-        """Facts of the scenes of a finished sweep, as `with_scene_facts` takes them."""
+        """Facts of the scenes of a finished sweep, as `with_facts` takes them."""
         file = self.path / SCENES_CSV
         if not file.is_file():
             return []
@@ -257,8 +271,8 @@ class ResultFolder:
         return [fact | {"notes": notes.get(tuple(fact[name] for name in OF_SCENE), [])} for fact in facts]
 
     def note_lines(self) -> list[str]:
-        """What the user should know of the results: a line for each kind of event in scenes, and on models."""
-        return [*self._scene_notes(), *self._support_notes()]
+        """What the user should know of the results: a line for each broken invariant, event in scenes, and model."""
+        return [*lines(self._invariants()), *self._scene_notes(), *self._support_notes()]
 
     def _support_notes(self) -> list[str]:
         """How many cases begin where a model was not trained, a line per scenario, variation and model."""
@@ -422,9 +436,10 @@ class ResultFolder:
         return read_json(self.path / name)
 
 
-def with_scene_facts(rows: pa.Table, facts: list[dict[str, Any]]) -> pa.Table:
-    """Result rows with the facts of the scenes that they come from, for `ResultFolder.add`."""
-    return rows.replace_schema_metadata({**(SCHEMA.metadata or {}), SCENE_FACTS: json.dumps(facts)})
+def with_facts(rows: pa.Table, facts: list[dict[str, Any]], invariants: Checked) -> pa.Table:
+    """Result rows with the facts of their scenes, and what their invariants came to, for `ResultFolder.add`."""
+    own = {SCENE_FACTS: json.dumps(facts), INVARIANTS: json.dumps(invariants)}
+    return rows.replace_schema_metadata({**(SCHEMA.metadata or {}), **own})
 
 
 def _completed(rows: pa.Table, more: Callable[[pa.Table], pa.Table] | None) -> pa.Table:

@@ -14,12 +14,16 @@ from merge_cosim.core.units import FloatArray
 
 
 class LeaderRule:
-    """The law of the method's controller where that is a law of following, else `acc` with its defaults."""
+    """The law of the method's controller where that is a law of following, else `acc` with its defaults.
+
+    Attributes:
+        law: It.
+    """
 
     def __init__(self, controller: Controller, setting: Setting) -> None:
         law = deepcopy(controller) if isinstance(controller, FollowingLaw) else Acc()
         law.start(1, setting)
-        self._law: FollowingLaw = law
+        self.law: FollowingLaw = law
         self._limit = setting.speed_limit
 
     def cap(self, acceleration: FloatArray, speed: FloatArray, leader: FloatArray) -> FloatArray:
@@ -32,9 +36,9 @@ class LeaderRule:
         """
         gap, leader_speed = leader
         led = np.isfinite(gap)
-        behind = self._law.clip(self._law.follow(np.where(led, gap, 0.0), speed, leader_speed))
+        behind = self.law.clip(self.law.follow(np.where(led, gap, 0.0), speed, leader_speed))
         return np.where(led, np.minimum(acceleration, behind), acceleration)
 
     def alone(self, speed: FloatArray, leader: FloatArray) -> FloatArray:
         """Acceleration [m/s^2] of a host without a merging car: free, and no more than behind its leader."""
-        return self.cap(self._law.clip(self._law.free(speed, self._limit)), speed, leader)
+        return self.cap(self.law.clip(self.law.free(speed, self._limit)), speed, leader)

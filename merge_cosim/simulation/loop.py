@@ -11,8 +11,9 @@ import pandas as pd
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.observation import Setting
-from merge_cosim.core.units import AnyArray, FloatArray, IntArray
+from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, IntArray
 from merge_cosim.merging_cars.base import MergingCar
+from merge_cosim.scoring.invariants import Bounds, broken
 from merge_cosim.scoring.rules import Rules, Watch
 from merge_cosim.scoring.scoring import score
 from merge_cosim.scoring.tracks import Tracks
@@ -70,6 +71,7 @@ class Run:
     Attributes:
         encounters: The encounters.
         columns: All measures of `score`, `sumo_collision`, and what the world adds; shape (n,) each.
+        broken: Which encounters break an invariant, shape (n,) each, for those that are broken at all.
         effort: What it cost.
         world: What moved the cars, see `World.kind`.
         traces: For each traced encounter, by name, one row per cycle; see `trace_of`.
@@ -79,6 +81,7 @@ class Run:
     columns: dict[str, AnyArray]
     effort: Effort
     world: WorldKind
+    broken: dict[str, BoolArray] = field(default_factory=dict)
     traces: dict[str, pd.DataFrame] = field(default_factory=dict)
 
 
@@ -135,6 +138,8 @@ class Loop:
         self._world, self._merging_car, self._setting, self._rules = world, merging_car, setting, rules
         self._traced = traced
         self._leader = LeaderRule(driver.controller, setting)
+        host = Bounds.of(driver.controller, self._leader.law) if world.commanded else Bounds()
+        self._bounds = host, Bounds.of(merging_car)
         world.start(encounters, setting, rules, self._leader, seed)
         self._found = encounters is None
         if encounters is not None:
@@ -153,6 +158,7 @@ class Loop:
         """The last cycle in each slot, where every encounter has one to itself: then the recorder holds them all."""
         self._cases = np.zeros(world.slots, dtype=np.int64)
         self._columns: dict[str, AnyArray] = {}
+        self._broken: dict[str, BoolArray] = {}
         self._traces: dict[str, pd.DataFrame] = {}
 
     def run(self) -> Run:
@@ -212,7 +218,8 @@ class Loop:
             effort.vehicle_steps = world.vehicle_steps
         effort.step_s = world.step_s - self._stepped
         effort.worst_difference_m = world.worst_difference_m
-        return Run(world.encounters, self._columns | world.columns(), effort, world.kind, self._traces)
+        columns = self._columns | world.columns()
+        return Run(world.encounters, columns, effort, world.kind, self._broken | world.broken(), self._traces)
 
     def _make_room(self) -> None:
         """Grow with the world, which may add slots."""
@@ -294,6 +301,8 @@ class Loop:
         for name, values in score(tracks, self._rules, encounters.log).items():
             column = self._columns.setdefault(name, np.empty(len(encounters), dtype=values.dtype))
             column[tracks.case] = values
+        for name, where in broken(tracks, *self._bounds).items():
+            self._broken.setdefault(name, np.zeros(len(encounters), dtype=bool))[tracks.case] = where
         cycles = 0 if self._found else int(tracks.cycles.sum())
         self._effort.encounter_cycles += cycles
         self._effort.vehicle_steps += 2 * cycles

@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.results.invariants import checked, lines
 from merge_cosim.scenarios.sources import Traffic
 from merge_cosim.simulation.loop import Everything
 from merge_cosim.sumo.attach import Address
@@ -57,9 +58,11 @@ def trace_case(
     finally:
         session.close()
     outputs.check()
-    rows = {row["case"]: row for row in task.rows(run).to_pylist()}
+    table = task.rows(run)
+    rows = {row["case"]: row for row in table.to_pylist()}
     if case in rows:
-        return rows[case], run.traces[case].assign(case=case)
+        broken = lines(checked(run, table))
+        return rows[case] | ({"broken": broken} if broken else {}), run.traces[case].assign(case=case)
     if "/" in case:
         few = f" (such as {', '.join(list(rows)[:3])})" if rows else ""
         raise UserError(f"scenario {task.scenario.name}: no encounter '{case}' is scored under {task.method.name}{few}")

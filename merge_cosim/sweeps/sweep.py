@@ -149,6 +149,7 @@ def sweep(
             "scenarios": sorted({*before.get("command", {}).get("scenarios", []), *_files(request)}),
             "data": str(request.data) if request.data else None,
         },
+        "invariants": folder.invariants(),
         "wall_s": round(perf_counter() - begin, 3),
         "plan_s": round(planned - begin, 3),
         "run_s": round(run_s, 3),

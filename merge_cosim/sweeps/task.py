@@ -14,8 +14,9 @@ from merge_cosim.core.registry import plugin_error
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.results.invariants import checked, joined
 from merge_cosim.results.rows import result_rows
-from merge_cosim.results.store import NO_RECORDS, with_scene_facts
+from merge_cosim.results.store import NO_RECORDS, with_facts
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.simulation.loop import Effort, Run, simulate
@@ -103,11 +104,14 @@ class Task:
         Raises:
             UserError: A component of a plugin has raised something.
         """
-        effort, tables, facts = Effort(), [], []
+        effort, tables, facts, found_broken = Effort(), [], [], []
         try:
             for run, found in self.runs(worker_session, traced=self.recorded or ()):
                 effort.add(run.effort)
-                tables.append(self._records(run) if self.recorded else self.rows(run))
+                rows = self._records(run) if self.recorded else self.rows(run)
+                tables.append(rows)
+                if not self.recorded:
+                    found_broken.append(checked(run, rows))
                 facts += [{**self.names, **fact} for fact in found]
         except Exception as error:
             if told := plugin_error(error):
@@ -115,7 +119,7 @@ class Task:
             raise
         if self.recorded:
             return pa.concat_tables(tables), effort
-        return with_scene_facts(pa.concat_tables(tables), facts), effort
+        return with_facts(pa.concat_tables(tables), facts, joined(found_broken)), effort
 
     def runs(
         self, worker_session: WorkerSession, options: RunOptions = AS_IN_A_SWEEP, traced: Container[str] = ()

@@ -2,14 +2,8 @@
 
 import pandas as pd
 
-from merge_cosim.report.collisions import (
-    BEFORE_SCORING,
-    ON_THE_LINE,
-    UNEXPLAINED,
-    collision_table,
-    explained,
-    kinds_of_difference,
-)
+from merge_cosim.report.collisions import collision_table, explained
+from merge_cosim.results.contacts import BEFORE_SCORING, ON_THE_LINE, UNEXPLAINED, kinds_of_difference
 from merge_cosim.results.store import ResultFolder
 from merge_cosim.sweeps.sweep import SweepRequest, sweep
 

@@ -11,7 +11,7 @@ import numpy as np
 from merge_cosim.core.encounter import NEVER, Encounters
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.random_streams import Keys, stream_keys
-from merge_cosim.core.units import AnyArray, FloatArray, IntArray
+from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, IntArray
 from merge_cosim.scoring.rules import Rules, expected_cycles
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ class World(ABC):
         kind: What moves the cars.
         channels: What is recorded of each encounter and cycle beside both cars' states.
         slots: Number of slots; it may grow.
+        commanded: The hosts are driven by the method, so that they keep within its bounds.
         step_s: Time [s] spent inside the steps of what moves the cars; commanding and reading is not in it.
         vehicle_steps: Cars times steps, where the world counts them; None for the two cars of each encounter.
         worst_difference_m: Largest difference of the stations from the closed form, at an encounter's end [m].
@@ -86,6 +87,7 @@ class World(ABC):
 
     kind: ClassVar[WorldKind] = "sumo"
     channels: ClassVar[tuple[str, ...]] = ()
+    commanded: ClassVar[bool] = True
     slots: int
     step_s: float = 0.0
     vehicle_steps: int | None = None
@@ -157,6 +159,10 @@ class World(ABC):
         """Further columns of the encounters, shape (n,) each; `sumo_collision`: SUMO reported their contact."""
         return {"sumo_collision": np.zeros(len(self.encounters), dtype=bool)}
 
+    def broken(self) -> dict[str, BoolArray]:
+        """Which encounters break an invariant that the world itself looks at, shape (n,) each; see `INVARIANTS`."""
+        return {}
+
     def close(self) -> None:
         """End the simulation."""
 
@@ -192,6 +198,7 @@ class GivenWorld(World):
         self._score_until = np.full(n, NEVER) if encounters.log is None else encounters.log.score_until
         self._queue = np.argsort(-expected_cycles(encounters, rules), kind="stable")
         self._ever_collided = np.zeros(n, dtype=bool)
+        self._broken: dict[str, BoolArray] = {}
         self.restart()
         self.worst_difference_m = 0.0
 
@@ -243,3 +250,12 @@ class GivenWorld(World):
     def columns(self) -> dict[str, AnyArray]:
         """See `World`."""
         return {"sumo_collision": self._ever_collided}
+
+    def broken(self) -> dict[str, BoolArray]:
+        """See `World`."""
+        return self._broken
+
+    def breaks(self, invariant: str, slots: IntArray) -> None:
+        """Note that the encounters in some slots break an invariant."""
+        if len(slots):
+            self._broken.setdefault(invariant, np.zeros(len(self._encounters), dtype=bool))[self._case[slots]] = True

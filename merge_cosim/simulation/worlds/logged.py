@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from merge_cosim.core.errors import UserError
 from merge_cosim.core.observation import DECIMALS
 from merge_cosim.core.units import DT, TOLERANCE, FloatArray, IntArray
 from merge_cosim.ngsim.pairing.recordings import LoggedScene, PairInScene
@@ -144,6 +145,7 @@ class LoggedWorld(GivenWorld):
     def ended(self, over: IntArray, age: IntArray) -> Ended | None:
         """See `World`; ends the encounter's simulation."""
         if len(over):
+            self._check_lane()
             self.end_scene()
         return super().ended(over, age)
 
@@ -167,6 +169,12 @@ class LoggedWorld(GivenWorld):
         self._traffic = None
         self._session.close()
 
+    def _check_lane(self) -> None:
+        """Note a host that is off its lane; the merging car's log may lead anywhere."""
+        strip = self._road.at(self._session.lane(self._pair.host))
+        if strip is None or strip.lane != self._host_lane:
+            self.breaks("lane", np.array([0]))
+
     def _simulate(self) -> None:
         begin = perf_counter()
         self._session.step()
@@ -183,6 +191,11 @@ class LoggedWorld(GivenWorld):
                 if strip.lane == self._host_lane and name not in (self._pair.host, self._pair.merging):
                     in_lane.append(InLane(name, x[name], self._lengths[name]))
         self.vehicle_steps = (self.vehicle_steps or 0) + len(names)
+        for name in {self._pair.host, self._pair.merging} - x.keys():
+            raise UserError(
+                f"{self._ramp.net}: case {self.encounters.case[self._case[0]]}: car {name} has left the ramp's lanes "
+                f"before the case was over; lower test.horizon or test.time_out"
+            )
         neighbours = self._neighbours
         neighbours.look(x[self._pair.host], in_lane)
         leader_speed = session.speed(neighbours.leader) if neighbours.leader else 0.0

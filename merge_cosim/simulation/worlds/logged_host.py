@@ -24,6 +24,8 @@ class LoggedHostWorld(ClosedFormWorld):
     A host whose log ends before scoring does goes on at its last speed.
     """
 
+    commanded = False
+
     def start(
         self, encounters: Encounters | None, setting: Setting, rules: Rules, leader: LeaderRule, seed: int
     ) -> None:

@@ -13,7 +13,7 @@ from merge_cosim.core.units import DT, TOLERANCE, FloatArray, IntArray
 from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.simulation.worlds.base import Ended, GivenWorld
 from merge_cosim.simulation.worlds.closed_form import ClosedForm
-from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, LanePosition
+from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, LanePosition, Part
 from merge_cosim.sumo.options import SumoOptions
 from merge_cosim.sumo.session import Car, Errors, Session
 from merge_cosim.sumo.start import LibsumoSession, one_line
@@ -126,13 +126,37 @@ class TiledWorld(GivenWorld):
     def ended(self, over: IntArray, age: IntArray) -> Ended | None:
         """See `World`; the stations are compared with the closed form's, in which a difference would have added up."""
         if len(over):
-            apart = np.abs(self.state[:2, over] - self._closed_form.state[:2, over]).max()
-            self.worst_difference_m = max(self.worst_difference_m, float(apart))
+            apart = np.abs(self.state[:2, over] - self._closed_form.state[:2, over]).max(axis=0)
+            self.worst_difference_m = max(self.worst_difference_m, float(apart.max()))
+            self.breaks("closed_form", over[~(apart <= TOLERANCE)])
+            self._check_lanes(over)
         return super().ended(over, age)
 
     def close(self) -> None:
         """See `World`."""
         self.session.close()
+
+    def _gone(self) -> UserError:
+        """A car is in the net no longer, though its encounter is not over."""
+        row = [name in self.session.vehicles() for name in self._names].index(False)
+        car, case = ("host", "merging car")[row // self.slots], self.encounters.case[self._case[row % self.slots]]
+        return UserError(
+            f"{self.ramp.net}: case {case}: the {car} has left the net, which ends {self.ramp.downstream:.0f} m past "
+            f"the gore, before the case was over; make the last edge longer, or lower test.horizon or test.time_out"
+        )
+
+    def _check_lanes(self, slots: IntArray) -> None:
+        """Note the encounters with a car on a lane that is not its own."""
+        by_main, by_ramp = slots + (1 - self._by_ramp) * self.slots, slots + self._by_ramp * self.slots
+        past = self.state[self._by_ramp, slots]  # of the place where the merging car comes onto the host's lane
+        if not self.ramp.changes_lane:
+            past = past + self._merge_position[by_ramp]
+        for slot, *rows, way in zip(slots.tolist(), by_main.tolist(), by_ramp.tolist(), past.tolist(), strict=True):
+            lanes = (self._lanes[self.session.lane(self._names[row])] for row in rows)
+            on_main, merging = (lane.part if lane else None for lane in lanes)
+            due = Part.HOST if way > 0.0 else Part.MERGING
+            if on_main is not Part.HOST or (merging is not due and abs(way) > TOLERANCE):
+                self.breaks("lane", np.array([slot]))
 
     def _change_lanes(self, reached: FloatArray) -> None:
         """Command the lane changes of this cycle; `reached`: stations of the cars from the ramp at its end [m]."""
@@ -143,7 +167,10 @@ class TiledWorld(GivenWorld):
         self._in_host_lane |= arrives
 
     def _read(self) -> None:
-        position = np.fromiter(self.session.positions(self._names), np.float64, 2 * self.slots)
+        try:
+            position = np.fromiter(self.session.positions(self._names), np.float64, 2 * self.slots)
+        except self.session.errors:
+            raise self._gone() from None
         station = (self._along.x(position) - self._merge_position).reshape(2, self.slots)
         np.subtract(station, self.state[:2], out=self.state[2:])
         self.state[2:] /= DT

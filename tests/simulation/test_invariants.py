@@ -1,0 +1,153 @@
+"""What must hold in every run: each invariant is broken here by a run that really breaks it, and counted."""
+
+import numpy as np
+import pytest
+from cases import random_encounters
+from command import SMALL, merge_cosim
+from living import drive, us101, vehicle
+
+from merge_cosim.controllers.acc import Acc
+from merge_cosim.core.observation import Setting
+from merge_cosim.estimators.references import AlwaysGo
+from merge_cosim.merging_cars.base import merging_cars
+from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.results.store import MANIFEST, ResultFolder
+from merge_cosim.scoring.invariants import INVARIANTS
+from merge_cosim.scoring.rules import Rules
+from merge_cosim.simulation.host_driver import HostDriver
+from merge_cosim.simulation.loop import Run, simulate
+from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
+from merge_cosim.simulation.worlds.tiles import TiledWorld
+
+COUNT = 20
+
+
+class Hasty(Acc):
+    """Commands what its bounds forbid, on the hosts of every fifth slot."""
+
+    commanded = 0.0
+
+    def command(self, seen, log_odds, target):
+        acceleration = super().command(seen, log_odds, target)
+        return np.where(np.arange(len(acceleration)) % 5 == 0, self.commanded, acceleration)
+
+
+def run(world, controller=None, merge_position=0.0) -> Run:
+    encounters = random_encounters(COUNT, seed=3, merge_position=merge_position)
+    driver = HostDriver(AlwaysGo(), controller or Acc())
+    try:
+        return simulate(world, encounters, driver, merging_cars["designed"](), Rules(), Setting())
+    finally:
+        world.close()
+
+
+@pytest.mark.parametrize(
+    ("commanded", "expected"),
+    [(-3.9, set()), (-4.2, {"acceleration"}), (2.1, {"acceleration"}), (990.0, {"acceleration", "speed"})],
+)
+def test_a_controller_that_leaves_its_bounds(commanded, expected):
+    controller = Hasty()
+    controller.commanded = commanded
+    broken = run(ClosedFormWorld(COUNT), controller).broken
+    assert set(broken) == expected
+    for where in broken.values():
+        assert where.sum() == COUNT / 5  # those that it was commanded to, and no other
+
+
+def meddled(meddle, at=30) -> Run:
+    """A run on US-101's tiles in which SUMO is told something else once."""
+    world = TiledWorld(Ramp.load("us101"), COUNT)
+    step, cycles = world.session.step, iter(range(10_000))
+
+    def meddled_step():
+        step()
+        if next(cycles) == at:
+            meddle(world.session)
+
+    world.session.step = meddled_step
+    return run(world, merge_position=41.0)
+
+
+def test_nothing_is_broken_where_nobody_meddles():
+    assert meddled(lambda session: None).broken == {}
+
+
+def test_a_car_that_is_put_elsewhere():
+    def teleport(session):
+        lane, position = session.lane("t3.merging"), session.lane_position("t3.merging")
+        session.place("t3.merging", lane, position + 5.0)
+
+    broken = meddled(teleport).broken
+    assert set(broken) == {"acceleration", "closed_form"}
+    assert all(where.sum() == 1 for where in broken.values())
+
+
+def test_a_car_on_the_wrong_lane():
+    def astray(session):
+        edge = session.lane("t3.host").rpartition("_")[0]
+        assert edge == "t3.weave"
+        session.place("t3.host", "t3.weave_0", session.lane_position("t3.host"))
+
+    broken = meddled(astray, at=60).broken
+    assert set(broken) == {"lane"}
+    assert broken["lane"].sum() == 1
+
+
+@pytest.mark.parametrize(("way", "expected"), [(8.0, {"jump"}), (-8.0, {"jump", "station"})])
+def test_a_teleport_in_living_traffic(tmp_path, way, expected):
+    cars = (vehicle("h", "host", 440, 20), vehicle("m", "merging", 470, 20, route="ramp"))
+    with us101(tmp_path, *cars) as (api, driven):
+
+        def each(cycle):
+            if cycle == 20:
+                api.vehicle.moveTo("h", api.vehicle.getLaneID("h"), api.vehicle.getLanePosition("h") + way)
+                api.vehicle.setPreviousSpeed("h", api.vehicle.getSpeed("h"))
+
+        drive(api, driven, 200, each)
+        found = driven.close()
+    assert len(found.encounters) == 1
+    assert set(found.broken) == expected
+
+
+PLUGIN = """
+import numpy as np
+import merge_cosim as mc
+from merge_cosim.controllers.acc import Acc
+
+@mc.controller
+class Hard(Acc):
+    name = "hard"
+    def command(self, seen, log_odds, target):
+        return np.full(len(seen.host_speed), -9.0)
+"""
+
+
+def test_a_broken_invariant_is_counted_and_told(tmp_path):
+    (tmp_path / "hard.py").write_text(PLUGIN)
+    (tmp_path / "small.toml").write_text(SMALL)
+    words = ("sweep", "small.toml", "--plugin", "hard.py", "--world", "closed-form", "--out", "out", "--method")
+    done = merge_cosim(*words, "always-go+hard,acc", cwd=tmp_path)
+    line = (
+        f"broken invariant 'acceleration' ({INVARIANTS['acceleration']}): 75 of 150 encounters, such as small "
+        "always-go+hard d+0_h10_m10"
+    )
+    assert (done.returncode, done.stderr.strip()) == (0, line)
+    counted = ResultFolder(tmp_path / "out").read_json(MANIFEST)["invariants"]
+    assert counted["broken"] == dict.fromkeys(INVARIANTS, 0) | {"acceleration": 75}
+    added = merge_cosim(
+        "sweep", "small.toml", "--world", "closed-form", "--out", "out", "--add", "--method", "always-go", cwd=tmp_path
+    )
+    assert line.replace("150", "225") in added.stderr
+    alone = merge_cosim(
+        "run", "small.toml", "--case", "d+0_h25_m25", "--plugin", "hard.py", "--method", "always-go+hard", cwd=tmp_path
+    )
+    assert "broken invariant 'acceleration'" in alone.stdout.splitlines()[-1]
+
+
+def test_a_car_that_leaves_the_net_before_its_case_is_over(tmp_path):
+    (tmp_path / "small.toml").write_text(SMALL)
+    words = ("--set", "test.horizon=60", "--set", "test.time_out=200", "--method", "always-go", "--jobs", "1")
+    done = merge_cosim("sweep", "small.toml", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "has left the net, which ends 1500 m past the gore, before the case was over" in done.stderr
