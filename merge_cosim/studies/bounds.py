@@ -38,6 +38,7 @@ from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 from merge_cosim.studies.clairvoyant import Search, search_plans
 from merge_cosim.studies.minimum_delay import Ahead, Reach, earliest_pass_behind
 
+FINE = Search()
 MOST_DELAY = 5.0
 """Delay [s] beyond which a case counts as infeasible in the second bound."""
 
@@ -56,7 +57,11 @@ class Throttle(Controller):
 
 
 def bounds_of(
-    name: str, settings: dict[str, Any], data: Path | None, source: SourceChoice | None
+    name: str,
+    settings: dict[str, Any],
+    data: Path | None,
+    source: SourceChoice | None,
+    search: Search | None = FINE,
 ) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
     """Bounds of a scenario of two cars by its name or file: case by case, and counted per site and source.
 
@@ -65,7 +70,7 @@ def bounds_of(
     """
     scenario = load_scenario(name, settings)
     _check(scenario)
-    cases = bounds(scenario, load_encounters(scenario, data, source))
+    cases = bounds(scenario, load_encounters(scenario, data, source), search)
     return cases, summarise_bounds(cases)
 
 
@@ -94,13 +99,13 @@ def summarise_bounds(cases: pd.DataFrame) -> list[dict[str, Any]]:
     return rows
 
 
-def bounds(scenario: Scenario, encounters: Encounters, search: Search | None = None) -> pd.DataFrame:
+def bounds(scenario: Scenario, encounters: Encounters, search: Search | None = FINE) -> pd.DataFrame:
     """Bound what a host can reach in each case.
 
     Args:
         scenario: Two cars alone.
         encounters: Its cases.
-        search: How finely paths are searched; as `Search` has it, if not given.
+        search: How finely paths are searched; None for full throttle alone, which against a log is all that is needed.
 
     Returns:
         One row per case: `scenario`, `site`, `source`, `case`; `by_throttle`, `by_braking`, and `feasible`, that one of
@@ -129,7 +134,8 @@ def bounds(scenario: Scenario, encounters: Encounters, search: Search | None = N
         reach = Reach(setting.speed_limit, law.min_acceleration, law.max_acceleration)
         for row in np.flatnonzero(~by_throttle):
             earliest[row] = _behind(encounters, int(row), rules, reach)
-    plans = search_plans(encounters, merging_car, rules, setting, search or Search(), np.flatnonzero(~by_throttle))
+    wanted = np.flatnonzero(~by_throttle & (search is not None))
+    plans = search_plans(encounters, merging_car, rules, setting, search or FINE, wanted)
     driven = drive(plans.driver(encounters))
     found = driven["kind"] == 0
     smallest = earliest - free_time(encounters.host_station, encounters.host_speed, setting, rules.free)

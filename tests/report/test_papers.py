@@ -95,6 +95,17 @@ def test_ours_stand_beside_theirs(evidence):
         assert table.loc[method, "designed-2_published"] == published("designed-2", method).failure_pct
 
 
+def test_pairs_carried_on_stand_apart(evidence):
+    table = tables.extended(evidence).data.set_index("method")
+    rows = evidence.cases("us101-replay")
+    for method in ("acc", "fg"):
+        scored = rows[(rows["method"] == method) & ~rows["censored"]]
+        beyond = scored[scored["extended"]]
+        assert table.loc[method, "us101-replay_extended_failures"] == beyond["failed"].sum()
+        both = table.loc[method, ["us101-replay_logged_n", "us101-replay_extended_n"]]
+        assert both.tolist() == [len(scored) - len(beyond), len(beyond)]
+
+
 def test_the_page_of_the_docs_is_filled_from_the_folder(reproduced, tmp_path):
     results_page.main([str(reproduced), "--short", "--docs", str(tmp_path)])
     text = (tmp_path / "results.md").read_text(encoding="utf-8")

@@ -18,6 +18,8 @@ from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order
 from merge_cosim.report.model_tables import gmm_table
 from merge_cosim.report.published import CYCLE_MS, VALIDITY, Figure, published
+from merge_cosim.report.tables import ranges
+from merge_cosim.results.statistics.rates import wilson
 from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.studies.bounds import MOST_DELAY, bounds_of
@@ -111,8 +113,32 @@ def outcomes(evidence: Evidence) -> dict[str, Table]:
         "same-cases": compared,
         "distances": distances,
         "costs": costs,
+        "extended": extended(evidence),
         "time": _times(evidence),
     }
+
+
+def extended(evidence: Evidence) -> Table:
+    """Failures in the replays, apart for the pairs logged to the end and for those carried on beyond their log."""
+    replays = [name for name in evidence.scenarios if load_scenario(name).is_replay]
+    methods = in_order(evidence.results["method"].unique())
+    data, columns = pd.DataFrame({"method": methods}), [METHOD]
+    for scenario in replays:
+        rows = evidence.cases(scenario)
+        for name, beyond in (("logged to the end", False), ("carried on", True)):
+            scored = rows[~rows["censored"] & (rows["extended"] == beyond)]
+            failed = scored.groupby("method")["failed"].agg(["size", "sum"]).reindex(methods, fill_value=0)
+            low, high = zip(*(wilson(int(part), int(n)) for n, part in failed.to_numpy()), strict=True)
+            key, group = f"{scenario}_{'extended' if beyond else 'logged'}", f"{TESTS[scenario]}, {name}"
+            data[f"{key}_n"], data[f"{key}_failures"] = failed["size"].to_numpy(), failed["sum"].to_numpy()
+            data[f"{key}_interval_pct"] = ranges(pd.Series(low, dtype=float), pd.Series(high, dtype=float))
+            columns += [
+                Column(f"{key}_n", "pairs", 0, group),
+                Column(f"{key}_failures", "failed", 0, group),
+                Column(f"{key}_interval_pct", "95 %", None, group, range=True),
+            ]
+    title = "Failures of pairs logged to the end of scoring, and of pairs carried on at their last speed"
+    return Table.of(data, columns, list(map(is_reference, methods)), title)
 
 
 def bounds(study: Study) -> Table:
@@ -122,7 +148,7 @@ def bounds(study: Study) -> Table:
         row
         for scenario in map(str, request.scenarios)
         if load_scenario(scenario).is_replay
-        for row in bounds_of(scenario, request.settings, request.data, request.source)[1]
+        for row in bounds_of(scenario, request.settings, request.data, request.source, search=None)[1]
     ]
     columns = [
         Column("scenario", "test"),
