@@ -5,8 +5,10 @@ from pathlib import Path
 
 import geometry_page
 import headroom_page
+import kept_aside_page
 import method_pages
 import models_page
+import pandas as pd
 import ranking_page
 import robustness_page
 import scenes_page
@@ -68,6 +70,15 @@ def test_methods(tmp_path):
     method_pages.main(["--short", "--docs", str(tmp_path)])
     for page in (DOCS / "methods").glob("*.md"):
         assert made_like(tmp_path, f"methods/{page.name}") == page.read_text(encoding="utf-8")
+
+
+def test_kept_aside(tmp_path, data_dir):
+    kept_aside_page.main(["--short", "--docs", str(tmp_path), "--data", str(data_dir)])
+    text = made_like(tmp_path, "results.md")
+    assert "so 3 predictions per method" in text
+    for cars, high in ((8, 100.0), (40, 0.0)):  # one more car fails with probability 0.5 / (cars + 1)
+        none = pd.DataFrame({"car": range(cars), "failed": False})
+        assert kept_aside_page.rate_interval(none, 1) == (0.0, high)
 
 
 def test_models(tmp_path, data_dir):
