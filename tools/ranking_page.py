@@ -144,7 +144,7 @@ def taus(
 
 def conclusion(orders: pd.DataFrame, published: dict[str, float]) -> str:
     """What the settings show, in a paragraph."""
-    same, lead = int((orders["tau"] > 0.999).sum()), orders["best"].value_counts()
+    same, best = int((orders["tau"] > 0.999).sum()), orders["best"].str.split(", ").explode()
     off = orders[list(published)] - pd.Series(published)
     rules = orders.loc[off[list(RULES)].abs().sum(axis=1).idxmin()]
     every = orders.loc[off.abs().sum(axis=1).idxmin()]
@@ -154,8 +154,8 @@ def conclusion(orders: pd.DataFrame, published: dict[str, float]) -> str:
         f"published order ({theirs}) appears in {same} of {len(orders)} settings; Kendall's tau with it goes from "
         f"{orders['tau'].min():.2f} to {orders['tau'].max():.2f}. The methods that learn nothing ({', '.join(RULES)}) "
         f"come nearest to their published rates with {words(rules, published)}. All {len(published)} together come "
-        f"nearest with {words(every, published)}. Fewest failures, by number of settings: "
-        + "; ".join(f"{who} {count}" for who, count in lead.items())
+        f"nearest with {words(every, published)}. No other of them fails less often, ties counted for each: "
+        + ", ".join(f"{who} in {count} settings" for who, count in best.value_counts().items())
         + ". How much depends on the cars that trained a model is on another page ([models](models.md)).",
         120,
     )
@@ -206,7 +206,10 @@ def cell(row: pd.Series) -> str:
 def draw(rows: pd.DataFrame, target: Path) -> None:
     """Heat maps of failure rates: a column per method and choice of its own, a row per meaning of 'ahead'."""
     meanings = list(pd.unique(rows["ahead"]))
-    columns = list(rows.groupby(["method", *OWN], sort=False, dropna=False))
+    order = rows["method"].map({method: place for place, method in enumerate((*RULES, *LEARNED))})
+    columns = list(
+        rows.assign(order=order).sort_values("order", kind="stable").groupby(["method", *OWN], sort=False, dropna=False)
+    )
     size = (1.5 * len(columns) + 1.2, 2.4 * len(meanings) + 0.5)
     figure, axes = plt.subplots(
         len(meanings), len(columns), figsize=size, sharex=True, sharey=True, squeeze=False, layout="constrained"
