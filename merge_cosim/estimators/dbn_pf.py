@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
@@ -15,6 +15,9 @@ from merge_cosim.core.units import TOLERANCE, Count, FloatArray, IntArray, Share
 from merge_cosim.estimators.base import Estimator, estimators
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.estimators.particles import Cloud, Dice, low_variance
+
+if TYPE_CHECKING:
+    from merge_cosim.estimators.compiled.particle_filter import ActionLaw, FilterLaw
 
 
 class Maneuver(IntEnum):
@@ -110,6 +113,13 @@ class DbnPf(Estimator):
         rest = max(1.0 - self.start_yield - self.start_not_yield, 0.0)
         return np.array([self.start_yield, self.start_not_yield, rest])
 
+    _watched = False
+
+    def watch(self) -> None:
+        """Keep the whole of each update in `last_step`, for a figure."""
+        self._watched = True
+        self.last_step: Step | None = None
+
     def use(self, model: IntentionModel) -> None:
         """Take the speed that drivers merge at."""
         self._desired_speed = model.merge_speed
@@ -126,7 +136,6 @@ class DbnPf(Estimator):
         self._dice = Dice(count)
         self._arrival = np.zeros(count)
         self._log_odds = np.zeros(count)
-        self.last_step: Step | None = None
 
     def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
         """Begin new streams; the clouds are drawn at the first observation."""
@@ -139,12 +148,11 @@ class DbnPf(Estimator):
         first = np.flatnonzero(self._age == 0)
         if len(first):
             belief = np.repeat(self.start_belief[:, None], len(first), axis=1)
-            cloud = self._drawn_at(seen, first, belief, self.particles)
-            self._keep(first, cloud, belief, merging, host)
+            self._cloud.put(first, self._drawn_at(seen, first, belief))
+            self._keep(first, belief, merging, host)
         due = np.flatnonzero((self._age > 0) & (self._age % self._cycles == 0))
         if len(due):
-            self.last_step = self._step(seen, due)
-            self._keep(due, self.last_step.after, self.last_step.belief, merging, host)
+            self._keep(due, self._step(seen, due), merging, host)
         self._age += 1
         return self._log_odds.copy()
 
@@ -162,55 +170,62 @@ class DbnPf(Estimator):
         Returns:
             Shape (n, M).
         """
-        time = np.maximum(arrival, self.min_arrival)[:, None]
-        yields, beats = cloud.maneuver == Maneuver.YIELD, cloud.maneuver == Maneuver.NOT_YIELD
-        aim = np.where(yields, -(host_length + self.pad)[:, None], (merging_length + self.pad)[:, None])
-        needed = (aim - cloud.station - cloud.speed * time) * (2.0 / time**2)
-        mean = self.k_free * (self._desired_speed - cloud.speed)
-        np.clip(mean, self.min_acceleration, self.max_acceleration, out=mean)
-        np.minimum(mean, needed, out=mean, where=yields)
-        np.maximum(mean, needed, out=mean, where=beats)
-        return np.clip(mean, self.min_acceleration, self.max_acceleration, out=mean)
+        from merge_cosim.estimators.compiled.particle_filter import mean_accelerations
 
-    def _step(self, seen: Observation, rows: IntArray) -> Step:
-        before = self._cloud.take(rows)
-        between = self._moved(seen, rows, before)
-        logs = ((seen.merging_station[rows, None] - between.station) * (1.0 / self.sigma_station)) ** 2
-        logs += ((seen.merging_speed[rows, None] - between.speed) * (1.0 / self.sigma_speed)) ** 2
-        logs -= logs.min(axis=1, keepdims=True)
-        weights = np.exp(-0.5 * logs)
-        weights /= weights.sum(axis=1, keepdims=True)
-        belief = np.stack([np.where(between.maneuver == one, weights, 0.0).sum(axis=1) for one in Maneuver])
-        chosen = low_variance(weights, self._dice.uniform(rows, 1)[:, 0], self.particles - self._new)
-        after = between.pick(chosen).beside(self._drawn_at(seen, rows, belief, self._new))
-        return Step(rows, before, between, weights, after, belief)
+        mean: FloatArray = mean_accelerations(
+            cloud.maneuver, cloud.station, cloud.speed, arrival, host_length, merging_length, self._action_law()
+        )
+        return mean
 
-    def _moved(self, seen: Observation, rows: IntArray, cloud: Cloud) -> Cloud:
-        """Let maneuvers change, then drive for one interval towards where the host stood and how it drove before."""
-        maneuver = cloud.maneuver
-        if self._change > 0:
-            # of the numbers below the probability, one half changes to the next maneuver and one to that after it
-            chance = self._dice.uniform(rows, self.particles) * (2.0 / self._change)
-            maneuver = (maneuver + (chance < 2.0) + (chance < 1.0)) % len(Maneuver)
-        cloud = Cloud(cloud.station, cloud.speed, maneuver)
-        lengths = seen.host_length[rows], seen.merging_length[rows]
-        acceleration = self.mean_acceleration(cloud, self._arrival[rows], *lengths)
-        acceleration += self.acceleration_noise * self._dice.normal(rows, self.particles)
-        speed = np.maximum(cloud.speed + acceleration * self._tau, 0.0)
-        half = 0.5 * (self._tau + self.setting.dt)
-        station = cloud.station + cloud.speed * (self._tau - half) + speed * half
-        return Cloud(station, speed, maneuver)
+    def _action_law(self) -> ActionLaw:
+        from merge_cosim.estimators.compiled.particle_filter import ActionLaw
 
-    def _drawn_at(self, seen: Observation, rows: IntArray, belief: FloatArray, count: int) -> Cloud:
-        """`count` particles around what is observed, maneuvers by the belief."""
+        bounds = float(self.min_acceleration), float(self.max_acceleration)
+        return ActionLaw(
+            float(self._desired_speed), float(self.min_arrival), float(self.pad), float(self.k_free), *bounds
+        )
+
+    def _filter_law(self) -> FilterLaw:
+        from merge_cosim.estimators.compiled.particle_filter import FilterLaw
+
+        return FilterLaw(
+            tau=self._tau,
+            half=0.5 * (self._tau + self.setting.dt),
+            change=float(self._change),
+            acceleration_noise=float(self.acceleration_noise),
+            sigma_station=float(self.sigma_station),
+            sigma_speed=float(self.sigma_speed),
+            new=self._new,
+        )
+
+    def _step(self, seen: Observation, rows: IntArray) -> FloatArray:
+        """Drive towards where the host stood and how it drove before, weigh, resample; returns the belief, (3, m)."""
+        from merge_cosim.estimators.compiled.particle_filter import Particles, Scene, step
+
+        held = len(rows) if self._watched else 1
+        between, weights = Cloud.empty(held, self.particles), np.empty((held, self.particles))
+        belief = np.empty((len(Maneuver), len(rows)))
+        whole, moved = (Particles(cloud.station, cloud.speed, cloud.maneuver) for cloud in (self._cloud, between))
+        own = (seen.host_length, seen.merging_length, seen.merging_station, seen.merging_speed)
+        scene = Scene(self._arrival[rows], *(values[rows] for values in own))
+        keys, drawn = self._dice.streams(rows)
+        before = self._cloud.take(rows) if self._watched else None
+        step(whole, rows, scene, keys, drawn, self._action_law(), self._filter_law(), moved, weights, belief)
+        self._dice.went_on(rows, drawn)
+        if before is not None:
+            self.last_step = Step(rows, before, between, weights, self._cloud.take(rows), belief)
+        return belief
+
+    def _drawn_at(self, seen: Observation, rows: IntArray, belief: FloatArray) -> Cloud:
+        """Particles around what is observed, maneuvers by the belief."""
+        count = self.particles
         noise = self._dice.normal(rows, 2 * count)
         station = seen.merging_station[rows, None] + self.sigma_station * noise[:, :count]
         speed = np.maximum(seen.merging_speed[rows, None] + self.sigma_speed * noise[:, count:], 0.0)
         maneuver = low_variance(np.ascontiguousarray(belief.T), self._dice.uniform(rows, 1)[:, 0], count)
         return Cloud(station, speed, maneuver)
 
-    def _keep(self, rows: IntArray, cloud: Cloud, belief: FloatArray, merging: FloatArray, host: FloatArray) -> None:
-        self._cloud.put(rows, cloud)
+    def _keep(self, rows: IntArray, belief: FloatArray, merging: FloatArray, host: FloatArray) -> None:
         self._arrival[rows] = host[rows]
         earlier = merging[rows] - host[rows] < -TOLERANCE
         not_yield = belief[Maneuver.NOT_YIELD] + np.where(earlier, belief[Maneuver.IGNORE], 0.0)

@@ -36,19 +36,6 @@ class Cloud:
         """Replace the clouds at `rows` by those of `other`."""
         self.station[rows], self.speed[rows], self.maneuver[rows] = other.station, other.speed, other.maneuver
 
-    def pick(self, particles: IntArray) -> Cloud:
-        """Return the chosen particles of each encounter, `particles` of shape (n, K)."""
-        flat = particles + np.arange(len(particles))[:, None] * self.station.shape[1]
-        return Cloud(self.station.take(flat), self.speed.take(flat), self.maneuver.take(flat))
-
-    def beside(self, other: Cloud) -> Cloud:
-        """Both clouds of each encounter as one."""
-        return Cloud(
-            np.concatenate([self.station, other.station], axis=1),
-            np.concatenate([self.speed, other.speed], axis=1),
-            np.concatenate([self.maneuver, other.maneuver], axis=1),
-        )
-
 
 class Dice:
     """The random streams of a batch of encounters, each with its own counter of numbers drawn."""
@@ -68,6 +55,14 @@ class Dice:
     def normal(self, rows: IntArray, count: int) -> FloatArray:
         """The next `count` standard normal numbers of the streams at `rows`, shape (m, count)."""
         return normal(self._keys[rows], self._advance(rows, count), count)
+
+    def streams(self, rows: IntArray) -> tuple[Keys, IntArray]:
+        """Keys of the streams at `rows` and how many numbers of each were drawn, shape (m,) each."""
+        return self._keys[rows], self._drawn[rows]
+
+    def went_on(self, rows: IntArray, drawn: IntArray) -> None:
+        """So many numbers of the streams at `rows` have been drawn now."""
+        self._drawn[rows] = drawn
 
     def _advance(self, rows: IntArray, count: int) -> IntArray:
         first = self._drawn[rows]

@@ -42,6 +42,7 @@ def clouds_figure(model: IntentionModel) -> Figure:
     """Particles of DBN-PF before, between and after one update, for the driver that pulls ahead."""
     scenes = pulls_ahead()[: round(CLOUDS_AT / DT) + 1]
     estimator = _ready(DbnPf(), model)
+    estimator.watch()
     for scene in scenes:
         estimator.update(scene)
     step = estimator.last_step
@@ -77,6 +78,7 @@ def belief_figure(model: IntentionModel) -> Figure:
         figure, all_axes = canvas.grid_of(2, 2, (3.9, 3.2))
         for axes, (title, scenes) in zip(all_axes, cases.items(), strict=True):
             estimator = _ready(DbnPf(), model)
+            estimator.watch()
             not_yield, shares = [], []
             for scene in scenes:
                 not_yield.append(_probability(float(estimator.update(scene)[0])))

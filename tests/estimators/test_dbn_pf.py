@@ -22,6 +22,7 @@ CEILING = np.log(399)
 def ready(count=1, seed=0, **parameters):
     estimator = DbnPf(**parameters)
     estimator.use(MODEL)
+    estimator.watch()
     estimator.start(count, Setting())
     rows = np.arange(count)
     estimator.reset(rows, rows * 0 - 1, stream_keys(rows.astype(str), seed))

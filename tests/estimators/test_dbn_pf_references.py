@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
 from scipy.stats import norm
 
 from merge_cosim.core.observation import Observation, Setting
-from merge_cosim.core.random_streams import stream_keys
+from merge_cosim.core.random_streams import normal, stream_keys
+from merge_cosim.estimators.compiled.normal import normals, quantile
 from merge_cosim.estimators.dbn_pf import DbnPf, Maneuver
 from merge_cosim.estimators.learned.model import IntentionModel
-from merge_cosim.estimators.particles import Cloud
+from merge_cosim.estimators.particles import Cloud, Dice, low_variance
 from merge_cosim.report.belief_cases import pulls_ahead, stays_behind
 
 MODEL = replace(IntentionModel.load("us101-ngsim"), merge_speed=15.0)
@@ -28,6 +30,7 @@ def many(scene, count):
 def ready(runs, **parameters):
     estimator = DbnPf(**parameters)
     estimator.use(MODEL)
+    estimator.watch()
     estimator.start(runs, Setting())
     rows = np.arange(runs)
     estimator.reset(rows, rows * 0 - 1, stream_keys(rows.astype(str), 11))
@@ -227,3 +230,67 @@ def test_a_linear_gaussian_case_is_that_of_the_package_particles():
     assert (np.abs(ours.mean(axis=0) - theirs.mean(axis=0)) < 5 * error).all()
     # and as precise: no more than half again their spread
     assert (ours.std(axis=0) < 1.5 * theirs.std(axis=0) + 0.005).all()
+
+
+def numpy_step(estimator, seen, before, arrival, keys, first):
+    """The same update written for whole batches with numpy: cloud afterwards and belief.
+
+    `first`: how many numbers of each stream were drawn before.
+    """
+    count, new = estimator.particles, round(estimator.redrawn * estimator.particles)
+    rows = np.arange(len(keys))
+    dice = Dice(len(keys))
+    dice.reset(rows, keys)
+    dice.uniform(rows, first)
+    chance = dice.uniform(rows, count) * (2.0 / -np.expm1(-estimator.change_rate * TAU))
+    maneuver = (before.maneuver + (chance < 2.0) + (chance < 1.0)) % 3
+    time = np.maximum(arrival, estimator.min_arrival)[:, None]
+    yields, beats = maneuver == Maneuver.YIELD, maneuver == Maneuver.NOT_YIELD
+    aim = np.where(yields, -(seen.host_length + 2.0)[:, None], (seen.merging_length + 2.0)[:, None])
+    needed = (aim - before.station - before.speed * time) * (2.0 / time**2)
+    mean = np.clip(0.4 * (15.0 - before.speed), -4.0, 3.0)
+    mean = np.where(yields, np.minimum(mean, needed), np.where(beats, np.maximum(mean, needed), mean))
+    acceleration = np.clip(mean, -4.0, 3.0) + 0.5 * dice.normal(rows, count)
+    speed = np.maximum(before.speed + acceleration * TAU, 0.0)
+    station = before.station + before.speed * (TAU - HALF) + speed * HALF
+    away = ((seen.merging_station[:, None] - station) / 0.5) ** 2 + ((seen.merging_speed[:, None] - speed) / 0.3) ** 2
+    weights = np.exp(-0.5 * (away - away.min(axis=1, keepdims=True)))
+    weights /= weights.sum(axis=1, keepdims=True)
+    belief = np.stack([np.where(maneuver == one, weights, 0.0).sum(axis=1) for one in Maneuver])
+    chosen = low_variance(weights, dice.uniform(rows, 1)[:, 0], count - new)
+    noise = dice.normal(rows, 2 * new)
+    at_station = seen.merging_station[:, None] + 0.5 * noise[:, :new]
+    at_speed = np.maximum(seen.merging_speed[:, None] + 0.3 * noise[:, new:], 0.0)
+    at_maneuver = low_variance(np.ascontiguousarray(belief.T), dice.uniform(rows, 1)[:, 0], new)
+    pairs = ((station, at_station), (speed, at_speed), (maneuver, at_maneuver))
+    return [np.hstack([np.take_along_axis(one, chosen, axis=1), drawn]) for one, drawn in pairs], belief
+
+
+def test_the_compiled_update_is_that_of_numpy():
+    runs = 300
+    estimator, keys = ready(runs), stream_keys(np.arange(runs).astype(str), 11)
+    scenes = [many(scene, runs) for scene in pulls_ahead()[:31]]
+    before, drawn, arrival = None, 2 * 200 + 1, scenes[0].host_arrival
+    for t, scene in enumerate(scenes):
+        estimator.update(scene)
+        if t and t % 5 == 0:
+            step = estimator.last_step
+            after, belief = numpy_step(estimator, scene, step.before, arrival, keys, drawn)
+            drawn, arrival = drawn + 200 + 200 + 1 + 20 + 1, scene.host_arrival
+            np.testing.assert_allclose(step.belief, belief, rtol=0, atol=1e-12)
+            for one, other in zip((step.after.station, step.after.speed, step.after.maneuver), after, strict=True):
+                np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+            if before is not None:
+                np.testing.assert_array_equal(step.before.station, before)
+            before = step.after.station
+
+
+def test_the_compiled_quantile_is_that_of_scipy():
+    shares = np.concatenate(
+        [np.random.default_rng(0).random(2000), 0.5 ** np.arange(1, 54), 1 - 0.5 ** np.arange(1, 54)]
+    )
+    np.testing.assert_array_equal([quantile(share) for share in shares], ndtri(shares))
+    key = stream_keys(np.array(["a"]), 0)
+    filled = np.empty(500)
+    normals(key[0], np.uint64(7), filled)
+    np.testing.assert_array_equal(filled, normal(key, np.array([7]), 500)[0])

@@ -70,14 +70,8 @@ def test_each_encounter_has_its_own_counter():
     np.testing.assert_array_equal(dice.uniform(np.array([1]), 2)[0], uniform(keys[2:], np.array([0]), 2)[0])
 
 
-def test_clouds_are_picked_row_by_row():
+def test_clouds_are_taken_and_put_row_by_row():
     cloud = Cloud(*(np.arange(6).reshape(2, 3) + offset for offset in (0.0, 10.0)), np.array([[0, 1, 2], [2, 1, 0]]))
-    picked = cloud.pick(np.array([[0, 0, 2], [1, 2, 2]]))
-    np.testing.assert_array_equal(picked.station, [[0, 0, 2], [4, 5, 5]])
-    np.testing.assert_array_equal(picked.speed, [[10, 10, 12], [14, 15, 15]])
-    np.testing.assert_array_equal(picked.maneuver, [[0, 0, 2], [1, 0, 0]])
-    joined = cloud.beside(picked)
-    assert joined.station.shape == (2, 6)
     room = Cloud.empty(3, 3)
     room.put(np.array([2, 0]), cloud)
     np.testing.assert_array_equal(room.take(np.array([0])).station, cloud.station[1:])
