@@ -143,6 +143,7 @@ def run(
     trace: str | Path | None = None,
     outputs: SumoOutputs = NO_OUTPUTS,
     attach: str | None = None,
+    stays: bool = True,
 ) -> Run:
     """Run one case alone; its outcome is the same as in a sweep.
 
@@ -161,11 +162,13 @@ def run(
         seed: As in `merge_cosim.sweep`.
         plugins: As in `merge_cosim.sweep`.
         world: As in `merge_cosim.sweep`.
-        gui: Show it in sumo-gui.
+        gui: Show it in sumo-gui, with the host's belief and decision as its parameters and the decision as its colour
+            (green: goes first, orange: follows).
         delay: With `gui`: milliseconds per step; 100 is real time.
         trace: File to write the trace to (.csv or .parquet).
         outputs: Files that SUMO is to write.
         attach: `HOST:PORT` of a SUMO that runs with `--remote-port`, to drive in that one.
+        stays: With `gui`: the window stays until it is closed by hand.
 
     Returns:
         The result row and the trace.
@@ -188,7 +191,7 @@ def run(
         raise UserError(f"{trace}: a trace is written as .csv or .parquet")
     address = Address.parse(attach) if attach else None
     task = case_alone(plan(request), case)
-    row, record = trace_case(task, case, delay if gui else None, outputs, address)
+    row, record = trace_case(task, case, delay if gui else None, outputs, address, stays)
     if trace is not None:
         Path(trace).parent.mkdir(parents=True, exist_ok=True)
         if Path(trace).suffix == ".csv":

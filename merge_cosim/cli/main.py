@@ -173,8 +173,11 @@ def run(
     world: World = "sumo",
     host: Host = None,
     plugin: Plugins = None,
-    gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui.")] = False,
+    gui: Annotated[bool, typer.Option("--gui", help="Show it in sumo-gui, until the window is closed.")] = False,
     delay: Annotated[int, typer.Option(min=0, help="With --gui: milliseconds per step; 100 is real time.")] = 100,
+    quit_on_end: Annotated[
+        bool, typer.Option("--quit-on-end", help="With --gui: close the window when the case is over.")
+    ] = False,
     trace: Annotated[Path | None, typer.Option(help="Write every cycle to this file (.csv or .parquet).")] = None,
     video: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a video of it (.gif, or .mp4 with ffmpeg).")
@@ -222,6 +225,7 @@ def run(
         trace=trace,
         outputs=SumoOutputs(fcd, ssm, lanechange, tripinfo, collisions),
         attach=attach,
+        stays=not quit_on_end,
     )
     if json:
         print_json(done.row)

@@ -188,6 +188,8 @@ class Loop:
         self._speeds *= self._active
         world.command(self._speeds)
         self._recorder.decided(log_odds, self._speeds[0])
+        if world.shown:
+            world.show(log_odds)
         if self._told:
             self._recorder.tell(self._driver.told())
 

@@ -86,6 +86,10 @@ def words(options: Mapping[str, object]) -> list[str]:
     return [word for name, value in options.items() for word in (f"--{name}", str(value))]
 
 
+REAL_TIME = "delay", "1000"
+"""sumo-gui's option for real time, which it counts in milliseconds per simulated second."""
+
+
 def delay_option(milliseconds: float) -> tuple[str, str]:
     """The option of sumo-gui for a pause with every step, which it counts per simulated second."""
     return "--delay", str(milliseconds / DT)

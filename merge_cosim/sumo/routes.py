@@ -12,7 +12,7 @@ from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.ramps.view import FILE_NAME as VIEW
 from merge_cosim.ramps.view import copy_view
 from merge_cosim.sumo.lane_map import LaneMap
-from merge_cosim.sumo.options import STEP, WRITTEN, Options
+from merge_cosim.sumo.options import REAL_TIME, STEP, WRITTEN, Options
 from merge_cosim.sumo.vehicle_types import COLORS, CONTROLLED, MERGE_POSITION, ROLE
 from merge_cosim.sumo.xml import element, number, write_xml
 
@@ -63,7 +63,7 @@ def configuration(inputs: Options, processing: Options, with_view: bool, time: O
     """A SUMO configuration with our conditions; further options by section."""
     options = {
         "input": inputs,
-        "gui_only": {"gui-settings-file": VIEW} if with_view else {},
+        "gui_only": ({"gui-settings-file": VIEW} if with_view else {}) | dict([REAL_TIME]),
         "time": {"begin": "0", **time, **STEP},
         "processing": {**WRITTEN, **processing},
     }

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from merge_cosim.sumo.modes import LaneChangeMode, SpeedMode
-from merge_cosim.sumo.vehicle_types import CONTROLLED
+from merge_cosim.sumo.vehicle_types import CONTROLLED, RGBA
 
 SPEED_OF_SUMO = -1.0
 """The commanded speed that gives a vehicle back to its car-following model."""
 _SETTERS = {"minGap": "setMinGap", "sigma": "setImperfection", "speedDev": "setSpeedDeviation"}
 """By the attributes of a type, what sets them in a running SUMO."""
+FOLLOWS: Color = (240, 140, 0, 255)
+"""Colour of a host that follows its merging car, in a window."""
 _VIEW, _ZOOM = "View #0", 1500.0
 
 Errors = tuple[type[Exception], ...]
@@ -243,3 +245,11 @@ class Session:
         """Let the view of sumo-gui follow a vehicle."""
         self._api.gui.trackVehicle(_VIEW, car)
         self._api.gui.setZoom(_VIEW, _ZOOM)
+
+    def show(self, host: str, log_odds: float) -> None:
+        """Show what a host believes and decides: as parameters of the vehicle, and the decision as its colour."""
+        follows = log_odds >= 0.0
+        belief = f"{0.5 + 0.5 * math.tanh(0.5 * log_odds):.2f}"
+        self.set_color(host, FOLLOWS if follows else RGBA["host"])
+        self._api.vehicle.setParameter(host, "P(merging car does not yield)", belief)
+        self._api.vehicle.setParameter(host, "decision", "follows it" if follows else "goes first")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 import tempfile
@@ -21,6 +22,8 @@ from merge_cosim.sumo.session import Session
 LONGEST_RUN = 4 * HOUR
 """Longest time for a SUMO that runs to its end by itself [s]; a recording of the surrogate takes a minute."""
 
+QUIT = "--quit-on-end"
+"""Option of sumo-gui: its window closes when the simulation ends."""
 _NO_REASON = "Process Error"
 """What libsumo raises where it has told the reason elsewhere."""
 
@@ -65,13 +68,20 @@ class TraciSession(Session):
         errors = (traci.TraCIException, traci.FatalTraCIError)
         command = [sumolib.checkBinary("sumo-gui" if gui else "sumo"), *options.arguments()]
         if gui:
-            command += ["--start", "--quit-on-end", "--window-size", "1200,500"]
-        with redirect_stdout(sys.stderr):  # traci prints its attempts to connect
+            command += ["--start", "--window-size", "1200,500"]
+        with redirect_stdout(io.StringIO()):  # traci prints its attempts to connect
             try:
                 traci.start(command, stdout=sys.stderr)
             except errors as error:
                 raise UserError(f"{options.file}: SUMO cannot start: {one_line(error)}") from None
         super().__init__(traci, errors)
+        if gui and QUIT not in options.extra:
+            self.close = self._close_after_window
+
+    def _close_after_window(self) -> None:
+        """End the simulation, whose window stays until it is closed by hand."""
+        print("The case is over; close the window of sumo-gui to go on.", file=sys.stderr, flush=True)
+        self._api.close()
 
 
 def open_session(options: SumoOptions, gui: bool = False) -> Session:

@@ -243,6 +243,7 @@ def _single_world(ramp: Ramp, seed: int, options: RunOptions, host: Way) -> Tile
     shown = (*view_options(ramp.net.parent), *delay_option(options.gui_delay))
     world = TiledWorld(ramp, 1, seed, _open_window, (*shown, *options.extra), host=host)
     world.session.follow(tile_id(0, "host"))
+    world.shown = True
     return world
 
 

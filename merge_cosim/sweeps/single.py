@@ -17,7 +17,7 @@ from merge_cosim.sumo.attach import Address
 from merge_cosim.sumo.demand import write_traffic
 from merge_cosim.sumo.outputs import SumoOutputs
 from merge_cosim.sumo.routes import write_encounter
-from merge_cosim.sumo.start import connection_kept
+from merge_cosim.sumo.start import QUIT, connection_kept
 from merge_cosim.sweeps.cases import RunOptions, TrafficCases
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.task import Task
@@ -32,6 +32,7 @@ def trace_case(
     gui_delay: int | None = None,
     outputs: SumoOutputs = NO_OUTPUTS,
     attach: Address | None = None,
+    stays: bool = True,
 ) -> tuple[dict[str, Any], pd.DataFrame]:
     """Run a task of one case and return its result row and its record, one row per cycle.
 
@@ -51,7 +52,8 @@ def trace_case(
             raise UserError(f"{name}: not with --world {task.cases.world}, which runs without SUMO; leave one out")
     if gui_delay is not None and "DISPLAY" not in os.environ and sys.platform.startswith("linux"):
         raise UserError("--gui: there is no display (DISPLAY is not set); leave it out, or use xvfb-run")
-    options, session = RunOptions(gui_delay, outputs.prepare(), attach), WorkerSession(tiles=1)
+    quits = (QUIT,) if gui_delay is not None and not stays else ()
+    options, session = RunOptions(gui_delay, (*outputs.prepare(), *quits), attach), WorkerSession(tiles=1)
     try:
         with connection_kept():
             ((run, facts),) = task.runs(session, options, traced=Everything())

@@ -215,7 +215,7 @@ def test_contacts_are_reported(tmp_path, data_dir):
 def test_a_window_writes_the_same(tmp_path):
     case = [sys.executable, "-m", "merge_cosim.cli.main", "run", "designed-2", "--case", "d+1_h15_m14"]
     case += ["--method", "acc", "--fcd"]
-    with_window = ["xvfb-run", "-a", *case, "gui.xml", "--gui", "--delay", "5"]
+    with_window = ["xvfb-run", "-a", *case, "gui.xml", "--gui", "--delay", "5", "--quit-on-end"]
     for command in ([*case, "plain.xml"], with_window):
         subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=120, check=True)
     plain, gui = ((tmp_path / f"{name}.xml").read_text().partition("<fcd-export")[2] for name in ("plain", "gui"))

@@ -82,6 +82,7 @@ class World(ABC):
         commanded: The hosts are driven by the method, so that they keep within its bounds.
         step_s: Time [s] spent inside the steps of what moves the cars; commanding and reading is not in it.
         vehicle_steps: Cars times steps, where the world counts them; None for the two cars of each encounter.
+        shown: It is shown in a window, which is told what the hosts believe and decide.
         worst_difference_m: Largest difference of the stations from the closed form, at an encounter's end [m].
     """
 
@@ -91,6 +92,7 @@ class World(ABC):
     slots: int
     step_s: float = 0.0
     vehicle_steps: int | None = None
+    shown: bool = False
     worst_difference_m: float = 0.0
 
     @abstractmethod
@@ -145,6 +147,9 @@ class World(ABC):
     def finish(self, age: IntArray) -> Ended | None:
         """End what is still open when the run ends."""
         return None
+
+    def show(self, log_odds: FloatArray) -> None:
+        """Show what the hosts believe and decide, where `shown`, before the next step; shape (slots,)."""
 
     @property
     def leader(self) -> FloatArray | None:

@@ -66,7 +66,7 @@ class LoggedWorld(GivenWorld):
         self.step_s, self.vehicle_steps = 0.0, 0
         self.facts: dict[int, dict[str, Any]] = {}
         self._ramp, self._places, self._rules = ramp, places, rules
-        self._road, self._gui = logged_road(ramp), gui_delay is not None
+        self._road, self.shown = logged_road(ramp), gui_delay is not None
         self._folder = tempfile.TemporaryDirectory(prefix="merge-cosim-")
         types = Path(self._folder.name) / "types.add.xml"
         rules.drivers.write(types)
@@ -91,7 +91,7 @@ class LoggedWorld(GivenWorld):
         self._host_lane = scene.host_lane
         self._neighbours = Neighbours(self._lengths[pair.host], SIGHT)
         self._others_touched: set[tuple[str, ...]] = set()
-        self._session = open_session(self._options, self._gui)
+        self._session = open_session(self._options, self.shown)
         self._traffic = LoggedTraffic(self._session, scene, self._ramp, self._rules.drivers)
         self._traffic.advance(pair.start)
         self._simulate()
@@ -100,13 +100,17 @@ class LoggedWorld(GivenWorld):
         self._session.stay_on(pair.host, self._ramp.main_route)  # wherever its log leads
         for car, color in zip((pair.host, pair.merging), COLORS, strict=True):
             self._session.set_color(car, color)
-        if self._gui:
+        if self.shown:
             self._session.follow(pair.host)
         shown, given = self._read(), encounters.start[:2, case]
         if not np.allclose(shown, given, rtol=0, atol=TOLERANCE):
             raise RuntimeError(f"{encounters.case[case]}: starts at {given}, its scene has the cars at {shown}")
         self._state[:, 0] = *shown, *encounters.start[2:4, case]
         return self._around.copy()
+
+    def show(self, log_odds: FloatArray) -> None:
+        """See `World`."""
+        self._session.show(self._pair.host, float(log_odds[0]))
 
     def command(self, speeds: FloatArray) -> None:
         """See `World`; before the take-over the host drives as it was logged."""

@@ -69,7 +69,9 @@ class Scene:
             UserError: SUMO refuses the configuration, at its start or on the way; or see `AttachedSession`.
         """
         with running(self._open(gui_delay, extra, attach), self.file) as session:
-            yield TrafficWorld(session, self.ramp, self.name, self.end, self.warm_up, self.host, self.attention)
+            world = TrafficWorld(session, self.ramp, self.name, self.end, self.warm_up, self.host, self.attention)
+            world.shown = gui_delay is not None
+            yield world
 
     def facts(self, world: TrafficWorld) -> dict[str, Any]:
         """Counts and means of the traffic of a finished run; None for a mean over no car."""

@@ -132,6 +132,11 @@ class TiledWorld(GivenWorld):
             self._check_lanes(over)
         return super().ended(over, age)
 
+    def show(self, log_odds: FloatArray) -> None:
+        """See `World`."""
+        for name, odds in zip(self._names, log_odds.tolist(), strict=False):
+            self.session.show(name, odds)
+
     def close(self) -> None:
         """See `World`."""
         self.session.close()

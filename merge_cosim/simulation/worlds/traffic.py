@@ -95,6 +95,7 @@ class TrafficWorld(World):
         self.meetings = self.stopped = 0
         self.kept: list[Meeting] = []
         self.notes = Notes()
+        self._followed = ""
 
     def start(
         self, encounters: Encounters | None, setting: Setting, rules: Rules, leader: LeaderRule, seed: int
@@ -146,6 +147,17 @@ class TrafficWorld(World):
         for slot, meeting in self._by_slot.items():
             found[:, slot] = self._ahead[meeting.host.name]
         return found
+
+    def show(self, log_odds: FloatArray) -> None:
+        """See `World`; the view follows a host as long as that is on its way, then the next one."""
+        hosts = {host.name: -math.inf for host in self._driven}
+        for slot, meeting in self._by_slot.items():
+            hosts[meeting.host.name] = max(hosts[meeting.host.name], float(log_odds[slot]))
+        for name, odds in hosts.items():
+            self.session.show(name, odds)
+        if hosts and self._followed not in hosts:
+            self._followed = next(iter(hosts))
+            self.session.follow(self._followed)
 
     def command(self, speeds: FloatArray) -> None:
         """See `World`."""
