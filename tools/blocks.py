@@ -6,6 +6,7 @@ A block is `<!-- KIND: ARGUMENT -->` ... `<!-- end -->` in a page that is otherw
 import re
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -23,9 +24,11 @@ def page_parser(about: str | None) -> ArgumentParser:
 
 def fill_page(name: str, docs: Path, kinds: Mapping[str, Callable[[str], str | None]]) -> None:
     """Write the page `name` of the docs, its blocks filled anew, into the folder `docs`."""
-    target = docs / name
+    target, page = docs / name, DOCS / name
     target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(filled((DOCS / name).read_text(encoding="utf-8"), kinds), encoding="utf-8")
+    made = {kind: cache(make) for kind, make in kinds.items()}
+    filled(page.read_text(encoding="utf-8"), made)  # takes minutes, in which the page may be edited
+    target.write_text(filled(page.read_text(encoding="utf-8"), made), encoding="utf-8")
 
 
 def filled(text: str, kinds: Mapping[str, Callable[[str], str | None]]) -> str:

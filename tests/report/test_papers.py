@@ -95,6 +95,13 @@ def test_ours_stand_beside_theirs(evidence):
         assert table.loc[method, "designed-2_published"] == published("designed-2", method).failure_pct
 
 
+def test_learned_methods_have_a_range_over_models(evidence):
+    table = tables.over_models(evidence).data.set_index("method")
+    rates = evidence.by_model[evidence.by_model["method"] == "pgm"]["failure_pct"]
+    assert table.loc["pgm", "models"] == 2
+    assert table.loc["pgm", ["failure_pct_min", "failure_pct_max"]].tolist() == [rates.min(), rates.max()]
+
+
 def test_pairs_carried_on_stand_apart(evidence):
     table = tables.extended(evidence).data.set_index("method")
     rows = evidence.cases("us101-replay")

@@ -19,6 +19,7 @@ from merge_cosim.report.methods import in_order
 from merge_cosim.report.model_tables import gmm_table
 from merge_cosim.report.published import CYCLE_MS, VALIDITY, Figure, published
 from merge_cosim.report.tables import ranges
+from merge_cosim.results.statistics.ensemble import ensemble
 from merge_cosim.results.statistics.rates import wilson
 from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.scenarios.scenario import load_scenario
@@ -113,6 +114,7 @@ def outcomes(evidence: Evidence) -> dict[str, Table]:
         "same-cases": compared,
         "distances": distances,
         "costs": costs,
+        "over-models": over_models(evidence),
         "extended": extended(evidence),
         "time": _times(evidence),
     }
@@ -139,6 +141,21 @@ def extended(evidence: Evidence) -> Table:
             ]
     title = "Failures of pairs logged to the end of scoring, and of pairs carried on at their last speed"
     return Table.of(data, columns, list(map(is_reference, methods)), title)
+
+
+def over_models(evidence: Evidence) -> Table:
+    """Designed Test II with each model of the ensemble: median and range over models."""
+    rows = ensemble(evidence.by_model).set_index("method")
+    rows = rows.loc[in_order(rows.index)].reset_index()
+    columns = [METHOD, Column("models", "models", 0)]
+    for name, group in (
+        ("failure_pct", "failed %"),
+        ("failed_or_stuck_pct", "failed or stuck %"),
+        ("delay_s", "delay s"),
+    ):
+        columns += [Column(f"{name}_{what}", what, 2, group) for what in ("median", "min", "max")]
+    title = "Designed Test II with models that were each trained on another third of the merging cars"
+    return Table.of(rows, columns, [False] * len(rows), title)
 
 
 def bounds(study: Study) -> Table:
