@@ -21,6 +21,7 @@ from merge_cosim.studies.papers import cases, claims, figures, tables
 from merge_cosim.studies.papers.evidence import Evidence, gather
 from merge_cosim.studies.papers.page import write_reproduction
 from merge_cosim.studies.reproduction import DESIGNED, MODEL_SWEEP, NODE_SWEEP, PAIRS, Study, run, studies
+from merge_cosim.studies.training import train
 from merge_cosim.sweeps.sweep import SweepRequest
 
 METHODS = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg", "fg-gmm", "always-go", "human")
@@ -31,15 +32,15 @@ COARSE = {f"encounters.{name}.step": 12 for name in ("host_speed", "merging_spee
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> list[Study]:
-    """A grid of few speeds, and one in twenty of the surrogate's pairs, none of the training cars among them."""
+    """A grid of few speeds, and the surrogate's pairs that a model was not trained on."""
     several = tmp_path_factory.mktemp("models")
-    for name in ("us101-ngsim", "us101-surrogate"):
-        shutil.copy(MODELS / f"{name}.json", several)
-    designed = SweepRequest(("designed-2",), METHODS, settings=COARSE)
-    pairs = SweepRequest(
-        ("us101-replay",), METHODS, "us101-surrogate", {"encounters.fraction": 0.95}, source="surrogate"
-    )
-    nodes = replace(pairs, methods=("pgm",), variations=[("pgm.nodes", (1, 52, 80))])
+    shutil.copy(MODELS / "us101-ngsim.json", several)
+    model = several / "us101-surrogate.json"
+    train("us101", None, "surrogate", "car", 0, model)
+    designed = SweepRequest(("designed-2",), METHODS, settings=COARSE, world="closed-form")
+    pairs = SweepRequest(("us101-replay",), METHODS, str(model), source="surrogate")
+    varied = [("pgm.nodes", (1, 52, 80))]
+    nodes = replace(pairs, methods=("pgm",), variations=varied, world="closed-form")
     return [
         Study(DESIGNED, DESIGNED, designed),
         Study(PAIRS, "surrogate", pairs),
