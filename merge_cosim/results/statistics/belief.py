@@ -66,7 +66,6 @@ def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
         truth: The label is NOT_YIELD, shape (n,).
     """
     from scipy.special import expit
-    from sklearn.metrics import brier_score_loss
 
     found: dict[str, Any] = {
         "n": len(truth),
@@ -78,7 +77,7 @@ def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
         return found
     surprise = float(np.logaddexp(0.0, np.where(truth, -log_odds, log_odds)).mean())
     errors = [n * abs(mean - share) for _, _, n, mean, share in filled_bins(log_odds, truth)]
-    found["brier"] = round(float(brier_score_loss(truth, expit(log_odds))), 6)
+    found["brier"] = round(float(np.mean((expit(log_odds) - truth) ** 2)), 6)
     found["log_loss"] = round(surprise, 6) if np.isfinite(surprise) else None
     found["calibration_error"] = round(sum(errors) / len(truth), 6)
     found["auc"] = auc(log_odds, truth)
@@ -86,10 +85,13 @@ def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
 
 
 def auc(score: FloatArray, truth: BoolArray) -> float | None:
-    """Area under the ROC curve of a score for NOT_YIELD; None where only one label occurs."""
-    from sklearn.metrics import roc_auc_score
+    """Area under the ROC curve of a score for NOT_YIELD, by its ranks (ties count half); None for one label alone."""
+    from scipy.stats import rankdata
 
-    return round(float(roc_auc_score(truth, np.nan_to_num(score))), 6) if 0 < truth.sum() < len(truth) else None
+    positive = int(truth.sum())
+    pairs = positive * (len(truth) - positive)
+    above = rankdata(np.nan_to_num(score))[truth].sum() - positive * (positive + 1) / 2
+    return round(float(above / pairs), 6) if pairs else None
 
 
 def filled_bins(
