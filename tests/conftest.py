@@ -1,17 +1,14 @@
 """What the tests share: the real data where it is at hand, and a cache of their own."""
 
 import os
-
-for library in ("OMP", "OPENBLAS"):  # their threads would only wait for each other: the tests fill all cores
-    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-from merge_cosim.ngsim.surrogate.recipe import RECIPES
+for library in ("OMP", "OPENBLAS"):  # before numpy is imported: the tests fill all cores, threads only cost time
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 settings.register_profile("unhurried", deadline=None)  # two processes of tests share two cores with SUMO
 settings.load_profile("unhurried")
@@ -46,5 +43,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def short_surrogate() -> None:
     """One recording of five minutes of each site, by SUMO as ever, in place of three of fifteen."""
+    from merge_cosim.ngsim.surrogate.recipe import RECIPES
+
     for name, recipe in RECIPES.items():
         RECIPES[name] = replace(recipe, seeds=recipe.seeds[:1], duration=300.0)

@@ -47,7 +47,7 @@ def methods(folder: Path) -> set[str]:
 def test_an_estimator_from_a_file(files):
     assert "cautious" in printed(merge_cosim("methods", "--plugin", "my.py", "--json", cwd=files))
     words = ("--plugin", "my.py", "--method", "cautious", "--method", "acc", "--set", "cautious.lead=5")
-    printed(merge_cosim(*sweep_words(*words, "--jobs", "2"), cwd=files))
+    printed(merge_cosim(*sweep_words(*words), cwd=files))
     assert methods(files) == {"cautious", "acc"}
     assert Path(printed(merge_cosim("report", "out", cwd=files)).strip()).name == "report.html"
     assert "cautious" in (files / "out/report.html").read_text(encoding="utf-8")

@@ -2,12 +2,14 @@
 
 import gzip
 import math
+import shutil
 
 import numpy as np
 import pytest
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import cache_folder, from_cache
 from merge_cosim.ramps.build import build
 from merge_cosim.ramps.create.new import RampNumbers, new_ramp
 from merge_cosim.ramps.ramp import Ramp
@@ -39,7 +41,8 @@ BOMB = (
 
 
 def write(folder, routes=ROUTES, config=CONFIG):
-    ramp = new_ramp(folder / "mine", RampNumbers())
+    made = from_cache(cache_folder("tests") / "mine", lambda place: new_ramp(place, RampNumbers()))
+    ramp = shutil.copytree(made, folder / "mine")
     (folder / "my.rou.xml").write_text(routes)
     file = folder / "my.sumocfg"
     file.write_text(config.replace("designed.net.xml", Ramp.load(ramp).net.name))

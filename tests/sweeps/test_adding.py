@@ -41,7 +41,7 @@ def same(one, other):
 
 
 def test_added_methods_scenarios_and_variations_give_the_rows_of_one_sweep(tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "STRETCH_ROWS", 7)
+    monkeypatch.setattr(store, "STRETCH_ROWS", 20)
     first, second = (tmp_path / f"{name}.toml" for name in ("first", "second"))
     first.write_text(SMALL)
     second.write_text(SMALL.replace("step = 4", "step = 8"))
@@ -73,7 +73,7 @@ def test_what_is_there_already_is_not_run_again(tmp_path):
 
 
 def test_scenes_are_added_with_their_facts_and_notes(tmp_path):
-    how = {"world": "sumo", "settings": {"encounters.replications": 1, "encounters.demand.duration": 240}}
+    how = {"world": "sumo", "settings": {"encounters.replications": 1, "encounters.demand.duration": 120}}
     swept(tmp_path / "grown", "traffic-light", ["acc"], **how)
     one = swept(tmp_path / "grown", "traffic-light", ["always-go"], **how, add=True)
     every = swept(tmp_path / "every", "traffic-light", ["acc", "always-go"], **how)

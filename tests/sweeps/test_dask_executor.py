@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from command import COMMAND, merge_cosim, run_process, small_scenario
+from command import COMMAND, merge_cosim, refused, run_process, small_scenario
 from scene_files import small_scene
 
 import merge_cosim as merge_cosim_package
@@ -35,80 +35,88 @@ class Shipped(Estimator):
 """
 
 
-@contextmanager
-def cluster(folder, workers=2, threads=1, **environment):
-    """A scheduler and worker processes without nannies, which would start a killed worker anew."""
-    folder.mkdir()
-    started = []
-    here = os.environ | {"MERGE_COSIM_CACHE": str(folder / "cache")}
-
-    def start(*words):
-        log = (folder / f"{len(started)}.log").open("w")
+def started(folder, *words, **environment):
+    """A part of a cluster in a process of its own, and its log."""
+    log = folder / f"{words[0]}.log"
+    here = os.environ | {"MERGE_COSIM_CACHE": str(folder / "cache")} | environment
+    with log.open("w") as file:
         command = [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]]
-        process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=here | environment)
-        started.append(process)
-        return process, folder / f"{len(started) - 1}.log"
+        return subprocess.Popen(command, stdout=file, stderr=file, cwd=folder, env=here), log
 
+
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory):
+    """The address of a scheduler."""
+    options = ("--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--no-jupyter")
+    process, log = started(tmp_path_factory.mktemp("scheduler"), "dask_scheduler", *options)
     try:
-        _, log = start("dask_scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--no-jupyter")
-        address = None
-        for _ in range(300):
-            if found := re.search(r"Scheduler at:\s+(tcp://\S+)", log.read_text()):
-                address = found[1]
-                break
+        until = time.monotonic() + 30
+        while not (found := re.search(r"Scheduler at:\s+(tcp://\S+)", log.read_text())):
+            assert time.monotonic() < until, log.read_text()
             time.sleep(0.1)
-        assert address, log.read_text()
-        options = ("--nthreads", str(threads), "--no-nanny", "--no-dashboard")
-        yield address, [start("dask_worker", address, *options)[0] for _ in range(workers)]
+        yield found[1]
     finally:
-        for process in started:
+        process.kill()
+        process.wait(20)
+
+
+@contextmanager
+def workers(scheduler, folder, count=1, threads=1, **environment):
+    """Worker processes without nannies, which would start a killed worker anew."""
+    folder.mkdir()
+    options = ("--nthreads", str(threads), "--no-nanny", "--no-dashboard")
+    processes = [started(folder, "dask_worker", scheduler, *options, **environment)[0] for _ in range(count)]
+    try:
+        yield processes
+    finally:
+        for process in processes:
             process.kill()
             process.wait(20)
 
 
 @pytest.mark.slow
-def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path):
+def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path, scheduler):
     (tmp_path / "shipped.py").write_text(PLUGIN)
     ramp = merge_cosim("ramp", "new", "mine", "--out", "ramps", cwd=tmp_path)
     assert ramp.returncode == 0, ramp.stderr
     arguments = (
-        *("sweep", "designed-random", "--set", "encounters.count=2000", "--set", "ramp=ramps/mine"),
+        *("sweep", "designed-random", "--set", "encounters.count=1200", "--set", "ramp=ramps/mine"),
         *("--method", "pgm", "--method", "shipped", "--plugin", "shipped.py"),
     )
     alone = merge_cosim(*arguments, "--out", "alone", "--jobs", 1, cwd=tmp_path)
     assert alone.returncode == 0, alone.stderr
-    with cluster(tmp_path / "cluster") as (address, workers):
-        command = [*COMMAND, *map(str, arguments), "--dask", address, "--out", "there"]
+    with workers(scheduler, tmp_path / "workers", count=2) as (lost, _):
+        command = [*COMMAND, *map(str, arguments), "--dask", scheduler, "--out", "there"]
         sweep = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 120
         while not list(tmp_path.glob("there/parts/*.parquet")) and time.monotonic() < deadline:
             time.sleep(0.02)
-        workers[0].send_signal(signal.SIGKILL)
+        lost.send_signal(signal.SIGKILL)
         parts = len(list(tmp_path.glob("there/parts/*.parquet")))
         assert 0 < parts < 4  # in mid-run, and rows had come back by then
         _, error = sweep.communicate(timeout=240)
         assert sweep.returncode == 0, error
     assert (tmp_path / "there/results.parquet").read_bytes() == (tmp_path / "alone/results.parquet").read_bytes()
-    assert json.loads((tmp_path / "there/manifest.json").read_text())["command"]["dask"] == address
+    assert json.loads((tmp_path / "there/manifest.json").read_text())["command"]["dask"] == scheduler
 
 
 @pytest.mark.slow
-def test_workers_with_several_threads_are_refused(tmp_path):
-    with cluster(tmp_path / "cluster", workers=1, threads=2) as (address, _):
-        done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", address, cwd=tmp_path)
+def test_workers_with_several_threads_are_refused(tmp_path, scheduler):
+    with workers(scheduler, tmp_path / "workers", threads=2):
+        done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", scheduler, cwd=tmp_path)
     assert done.returncode == 2
     assert "2 threads" in done.stderr
     assert "--nthreads 1" in done.stderr
 
 
 @pytest.mark.slow
-def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path):
+def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path, scheduler):
     other = tmp_path / "other" / "merge_cosim"
     shutil.copytree(Path(merge_cosim_package.__file__).parent, other, ignore=shutil.ignore_patterns("__pycache__"))
     with (other / "core" / "units.py").open("a") as file:
         file.write("# edited\n")
-    with cluster(tmp_path / "cluster", workers=1, PYTHONPATH=str(other.parent)) as (address, _):
-        done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", address, cwd=tmp_path)
+    with workers(scheduler, tmp_path / "workers", PYTHONPATH=str(other.parent)):
+        done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", scheduler, cwd=tmp_path)
     assert done.returncode == 2
     assert re.search(r"worker \S+ has merge-cosim's source [0-9a-f]{16} instead of [0-9a-f]{16}", done.stderr)
     assert len(done.stderr.strip().splitlines()) == 1
@@ -117,7 +125,7 @@ def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path)
 @pytest.mark.slow
 def test_a_local_cluster_gives_the_same_bytes(tmp_path):
     scenarios = small_scenario(tmp_path), small_scene(tmp_path)
-    for out, run, where in (("here", merge_cosim, ()), ("there", run_process, ("--dask", "local", "--jobs", 2))):
+    for out, run, where in (("here", merge_cosim, ()), ("there", run_process, ("--dask", "local", "--jobs", 1))):
         done = run("sweep", *scenarios, "--method", "pgm", *where, "--out", out, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
@@ -132,13 +140,11 @@ def test_no_scheduler_is_one_line(tmp_path):
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-def test_without_dask_installed_there_is_one_line(tmp_path):
-    (tmp_path / "distributed.py").write_text("raise ImportError('hidden by the test')")
-    path = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH", "")]))
-    done = run_process("sweep", small_scenario(tmp_path), "--dask", "local", cwd=tmp_path, PYTHONPATH=path)
-    assert done.returncode == 2
-    assert "pip install 'merge-cosim[dask]'" in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+def test_without_dask_installed_there_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert "pip install 'merge-cosim[dask]'" in refused(
+        "sweep", small_scenario(tmp_path), "--dask", "local", cwd=tmp_path
+    )
 
 
 def test_other_versions_are_refused():

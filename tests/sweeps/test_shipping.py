@@ -65,7 +65,7 @@ try:
 except Refused as error:
     print(error)
 if "dask" in sys.argv:
-    assert mc.sweep(scenario, methods, jobs=2, dask="local", **more).rows.equals(alone.rows)
+    assert mc.sweep(scenario, methods, jobs=1, dask="local", **more).rows.equals(alone.rows)
 """
 
 
