@@ -18,7 +18,6 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.ngsim.data import find_data
 from merge_cosim.report.comparison import compare
-from merge_cosim.report.page import write_report
 from merge_cosim.report.run_command import run_command
 from merge_cosim.results.statistics.summary import CASE
 from merge_cosim.results.store import ENSEMBLE_CSV, MANIFEST, RIVALS_CSV, SUMMARY_JSON, ResultFolder
@@ -240,6 +239,8 @@ class Results:
         Raises:
             UserError: The folder holds no finished sweep, or not the method to compare with.
         """
+        from merge_cosim.report.page import write_report  # with matplotlib, which a sweep need not import
+
         page = write_report(self.path, against)
         if file is None:
             return page

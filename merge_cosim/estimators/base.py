@@ -46,6 +46,9 @@ class Estimator(Component):
             keys: Key of each one's random stream (`merge_cosim.core.random_streams`), shape (m,).
         """
 
+    def rest(self, rows: IntArray) -> None:
+        """The encounters at `rows` are over: until `reset`, what `update` gives for them means nothing; shape (m,)."""
+
     @abstractmethod
     def update(self, seen: Observation) -> FloatArray:
         """Take in one cycle and return `log P(NOT_YIELD) - log P(YIELD)`, shape (n,); +-inf for a rule, never NaN."""

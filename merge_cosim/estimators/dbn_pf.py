@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from merge_cosim.estimators.compiled.particle_filter import ActionLaw, FilterLaw
 
 
+OVER = -(1 << 60)
+"""Age of an encounter that is over: it never comes to an update."""
+
+
 class Maneuver(IntEnum):
     """How the driver of the merging car treats the host."""
 
@@ -141,6 +145,10 @@ class DbnPf(Estimator):
         """Begin new streams; the clouds are drawn at the first observation."""
         self._age[rows] = 0
         self._dice.reset(rows, keys)
+
+    def rest(self, rows: IntArray) -> None:
+        """Move no more particles."""
+        self._age[rows] = OVER
 
     def update(self, seen: Observation) -> FloatArray:
         """Start the new encounters, update those that are due, hold the others."""

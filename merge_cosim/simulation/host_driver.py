@@ -43,6 +43,10 @@ class HostDriver:
         self.estimator.reset(rows, labels, keys)
         self.controller.reset(rows)
 
+    def rest(self, rows: IntArray) -> None:
+        """See `Estimator.rest`."""
+        self.estimator.rest(rows)
+
     def decide(self, now: Observation) -> tuple[FloatArray, FloatArray]:
         """The log-odds of NOT_YIELD and the acceleration to command [m/s^2], shape (n,) each.
 
@@ -83,6 +87,11 @@ class DriverBlocks:
     def told(self) -> FloatArray:
         """What the controllers tell of the last cycle, shape (their channels, slots); see `Controller.told`."""
         return np.concatenate([block.controller.told() for block in self._blocks], axis=1)
+
+    def rest(self, rows: IntArray) -> None:
+        """See `Estimator.rest`."""
+        for number, block in enumerate(self._blocks):
+            block.rest(rows[rows // self._size == number] - number * self._size)
 
     def decide(self, seen: Observation, active: BoolArray) -> tuple[FloatArray, FloatArray]:
         """See `HostDriver.decide`; blocks without an active slot are left out, and their entries mean nothing."""

@@ -257,6 +257,7 @@ class Loop:
         """Take the tracks of encounters that have ended."""
         slots = ended.slots
         self._active[slots] = self._open[slots] = False
+        self._driver.rest(slots)
         valid, over_at = self._age[slots] - ended.back, self._over_at[slots]
         last = np.where(over_at >= 0, np.minimum(over_at, valid), valid)
         if self._last is not None:
