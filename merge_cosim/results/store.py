@@ -66,7 +66,7 @@ STRETCH_ROWS = 100_000
 """Rows that are sorted and written at a time; more where more cases lie between each other."""
 PART_ROWS = 1_000_000
 """A file with so many rows gets no more: `results.parquet` of more rows is a folder of such files."""
-BATCH_ROWS = 250_000
+BATCH_ROWS = 100_000
 """Rows from which a batch of whole cases is full."""
 
 

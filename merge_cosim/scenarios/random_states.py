@@ -14,6 +14,8 @@ from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.scenarios.sources import Random
 
 SOURCE = "random"
+BLOCK = 4_096
+"""Cases that are drawn together where some of them are wanted."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,13 @@ class RandomStates:
 
     def take(self, rows: IntArray) -> Encounters:
         """The chosen cases, in that order."""
-        return self.drawn().take(rows)
+        order = np.argsort(rows, kind="stable")
+        blocks = rows[order] // BLOCK
+        parts = [
+            self.part(block * BLOCK, min((block + 1) * BLOCK, len(self))).drawn().take(rows[own] - block * BLOCK)
+            for block, own in ((int(one), order[blocks == one]) for one in np.unique(blocks))
+        ]
+        return Encounters.concatenate(parts).take(np.argsort(order))
 
     def find(self, case: str) -> int | None:
         """Number of a case by its name; None if it is not among these."""

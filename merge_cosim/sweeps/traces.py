@@ -153,6 +153,17 @@ def _by_case(rows: pd.DataFrame) -> pd.DataFrame:
             "split": share * (1 - share),
             "spread": spread.fillna(0.0),
             "failed": by_case["failed"].any(),
-            "pattern": by_case["pattern"].agg(" ".join),
+            "pattern": _patterns(own, by_case.size()),
         }
     )
+
+
+def _patterns(own: pd.DataFrame, sizes: pd.Series) -> pd.Series:
+    """The `pattern` of the rows of each case, joined."""
+    patterns = pd.Series(np.char.multiply(" ", sizes.to_numpy() - 1), sizes.index, dtype=object)
+    rows = own[own["case"].isin(own.loc[own["bad"], "case"])]  # the others are nothing but spaces
+    joined: dict[str, str] = {}
+    for case, pattern in zip(rows["case"].tolist(), rows["pattern"].tolist(), strict=True):
+        joined[case] = f"{joined[case]} {pattern}" if case in joined else pattern
+    patterns.loc[[*joined]] = [*joined.values()]
+    return patterns
