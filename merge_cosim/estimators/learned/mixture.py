@@ -56,13 +56,16 @@ class SpeedMixture:
             UserError: There are too few transitions of an intention.
         """
         from sklearn.mixture import GaussianMixture  # imported where a model is trained: it is slow to import
+        from threadpoolctl import threadpool_limits
 
         weights, means, covariances = [], [], []
         for intention in (Intention.YIELD, Intention.NOT_YIELD):
             speeds = np.column_stack([before, now])[label == intention]
             if (different := len(np.unique(speeds, axis=0))) < COMPONENTS:
                 raise UserError(f"{different} different speed transitions of {intention.name}; a mixture needs more")
-            fitted = GaussianMixture(COMPONENTS, covariance_type="full", random_state=RANDOM_STATE).fit(speeds)
+            mixture = GaussianMixture(COMPONENTS, covariance_type="full", random_state=RANDOM_STATE)
+            with threadpool_limits(1):  # for matrices of 2 x 2 threads wait for each other, fifteen times the work
+                fitted = mixture.fit(speeds)
             order = np.argsort(fitted.means_[:, 0], kind="stable")
             weights.append(fitted.weights_[order])
             means.append(fitted.means_[order])
