@@ -23,13 +23,9 @@ from merge_cosim.results.statistics.summary import CASE
 from merge_cosim.results.store import ENSEMBLE_CSV, MANIFEST, RIVALS_CSV, SUMMARY_JSON, ResultFolder
 
 if TYPE_CHECKING:
+    from merge_cosim.report.short_table import ShortTable
     from merge_cosim.sweeps.verify import Verification
 
-SHOWN = (
-    *("scenario", "variation", "site", "source", "method", "n", "failures", "failure_pct", "ci_low_pct", "ci_high_pct"),
-    *("censored", "host_not_reached", "distance_m", "delay_s", "hardest_braking", "unnecessary_yields", "cycle_us"),
-)
-"""Columns of the summary that fit a terminal."""
 EXAMPLE = "write one such as \"failed and method == 'pgm'\""
 
 
@@ -281,16 +277,26 @@ class Results:
         return len(self.rows)
 
     def __repr__(self) -> str:
+        from merge_cosim.report.text_table import as_text
+
         where = "" if self._temporary else f" in {self.path}"
-        return f"Results{where}: {len(self.rows):,} rows\n{self._shown().to_string(index=False)}"
+        return f"Results{where}: {len(self.rows):,} rows\n{as_text(self._tables())}"
 
     def _repr_html_(self) -> str:
-        return self._shown().to_html(index=False, border=0)
+        """The table, the verdict, and the interactive charts of the report."""
+        from merge_cosim.report.notebook import frame, tables_html
+        from merge_cosim.report.page import read_report, report_page
 
-    def _shown(self) -> pd.DataFrame:
-        summary = self.summary()
-        shown = summary[[name for name in SHOWN if name in summary]].replace("", None).dropna(axis="columns", how="all")
-        return shown.round(2)
+        page = report_page(read_report(self.path), brief=True)
+        return tables_html(self._tables()) + frame(page, "Charts of the results")
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
+        return {"text/plain": repr(self), "text/html": self._repr_html_()}
+
+    def _tables(self) -> list[ShortTable]:
+        from merge_cosim.report.short_table import short_tables, traffic_tables
+
+        return [*short_tables(self.path), *traffic_tables(self.path)]
 
 
 def _constant_part(condition: str) -> bool:

@@ -13,8 +13,7 @@ import pandas as pd
 from merge_cosim.api.request import ScenarioLike, request_of
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.learned.model import IntentionModel
-from merge_cosim.report.film import STILLS, VIDEOS, Film, Stage, check_file
-from merge_cosim.report.story import outcome
+from merge_cosim.report.story import outcome, story
 from merge_cosim.scenarios.encounters import SourceChoice
 from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.simulation.worlds.base import WorldKind
@@ -27,6 +26,8 @@ from merge_cosim.sweeps.task import Task
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from merge_cosim.report.film import Film, Stage
+
 Quantity = Literal["station", "speed", "log_odds"]
 
 
@@ -37,12 +38,12 @@ class Run:
     Attributes:
         row: The result row, as in `results.parquet`; of a whole scene of living traffic, its facts.
         trace: One row per cycle: time, station and speed of both cars, log-odds, command.
-        stage: Where it took place, for `video` and `stills`.
+        task: What was run.
     """
 
     row: dict[str, Any]
     trace: pd.DataFrame
-    stage: Stage
+    task: Task
 
     def plot(self, quantity: Quantity = "station") -> Figure:
         """Draw both cars over time.
@@ -77,6 +78,8 @@ class Run:
         Raises:
             UserError: Another kind of file, no ffmpeg, or a whole scene of living traffic.
         """
+        from merge_cosim.report.film import VIDEOS, check_file
+
         check_file("video", file, VIDEOS)
         self._film("video").write(Path(file))
         return Path(file)
@@ -97,6 +100,8 @@ class Run:
         Raises:
             UserError: Another kind of file, no still at all, or a whole scene of living traffic.
         """
+        from merge_cosim.report.film import STILLS, check_file
+
         check_file("stills", file, STILLS)
         if count < 1:
             raise UserError(f"stills: {count} of them; give 1 or more")
@@ -108,7 +113,21 @@ class Run:
             figure.savefig(files[-1])
         return files
 
+    @cached_property
+    def stage(self) -> Stage:
+        """Where it took place."""
+        from merge_cosim.report.film import Stage
+
+        pairs, ramp = self.task.cases.encounters, self.task.ramp
+        if pairs is not None:
+            lengths = float(pairs.host_length[0]), float(pairs.merging_length[0])
+            return Stage(ramp, self.task.scenario.host, lengths, float(pairs.merge_position[0]))
+        first = self.trace.iloc[0]
+        return Stage(ramp, merge_position=float(first["host_x_m"] - first["host_station_m"]))
+
     def _film(self, what: str) -> Film:
+        from merge_cosim.report.film import Film
+
         if "failed" not in self.row:
             raise UserError(
                 f"{what}: this is a whole scene of living traffic; run one of its encounters (SCENE/HOST/MERGING)"
@@ -116,14 +135,20 @@ class Run:
         return Film(self.stage, self.trace, "{scenario} {case}, {method}".format(**self.row), outcome(self.row))
 
     def __repr__(self) -> str:
-        return f"{self._shown.to_string()}\n({len(self.trace):,} cycles in .trace)"
+        return "\n".join((*story(self.row), f"({len(self.trace):,} cycles in .trace)"))
 
     def _repr_html_(self) -> str:
-        return self._shown.to_frame("value").to_html(border=0)
+        """What happened, and the report's case viewer."""
+        from merge_cosim.report.notebook import case_page, frame, pairs_html
 
-    @cached_property
-    def _shown(self) -> pd.Series:
-        return pd.Series({name: value for name, value in self.row.items() if value not in (None, "")}, dtype=object)
+        first, *others = story(self.row)
+        told = pairs_html([("case", first), *((line[:8].strip(), line[8:]) for line in others)])
+        if "failed" not in self.row or self.trace.empty:
+            return told
+        return told + frame(case_page(self.row, self.trace), "The case, to be watched")
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
+        return {"text/plain": repr(self), "text/html": self._repr_html_()}
 
 
 def run(
@@ -198,15 +223,4 @@ def run(
             record.to_csv(trace, index=False)
         else:
             record.to_parquet(trace, index=False)
-    return Run(row, record, _stage(task, record))
-
-
-def _stage(task: Task, record: pd.DataFrame) -> Stage:
-    """Where a task of one case takes place."""
-    pairs = task.cases.encounters
-    if pairs is not None:
-        lengths = float(pairs.host_length[0]), float(pairs.merging_length[0])
-        return Stage(task.ramp, task.scenario.host, lengths, float(pairs.merge_position[0]))
-    if record.empty:
-        return Stage(task.ramp)
-    return Stage(task.ramp, merge_position=float(record["host_x_m"].iloc[0] - record["host_station_m"].iloc[0]))
+    return Run(row, record, task)

@@ -21,7 +21,7 @@ from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.simulation.worlds.base import WorldKind
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Training:
     """A trained model and how it judges merging cars that it was not trained on.
 
@@ -39,6 +39,20 @@ class Training:
     def held_out(self) -> pd.DataFrame:
         """How each estimator judges held-out merging cars, by distance to the merging point."""
         return pd.DataFrame(self.report["held_out"])
+
+    def __repr__(self) -> str:
+        return f"{self._title}\n{self.held_out.round(3).to_string(index=False)}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self._title}</p>{self.held_out.round(3).to_html(index=False, border=0)}"
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
+        return {"text/plain": repr(self), "text/html": self._repr_html_()}
+
+    @property
+    def _title(self) -> str:
+        pairs, cars, source = (self.report[name] for name in ("train_pairs", "train_cars", "source"))
+        return f"Model {self.path}, trained on {pairs} pairs of {cars} cars ({source}); held-out merging cars:"
 
 
 def train(

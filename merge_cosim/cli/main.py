@@ -200,15 +200,17 @@ def run(
 ) -> None:
     """Run one case alone; its outcome is the same as in a sweep."""
     from merge_cosim.api.run import run as run_case
-    from merge_cosim.report.film import STILLS, VIDEOS, check_file
     from merge_cosim.report.story import story
     from merge_cosim.scenarios.settings import parse_setting
     from merge_cosim.sumo.outputs import SumoOutputs
 
-    if video is not None:
-        check_file("--video", video, VIDEOS)
-    if stills is not None:
-        check_file("--stills-file", stills_file, STILLS)
+    if video is not None or stills is not None:
+        from merge_cosim.report.film import STILLS, VIDEOS, check_file
+
+        if video is not None:
+            check_file("--video", video, VIDEOS)
+        if stills is not None:
+            check_file("--stills-file", stills_file, STILLS)
     done = run_case(
         scenario,
         case,

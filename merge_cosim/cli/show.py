@@ -7,16 +7,11 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     from merge_cosim.report.short_table import ShortTable
     from merge_cosim.sweeps.verify import Verification
-
-LEAST_TEXT = 12
-"""Texts of a table are folded to this many characters before a table is made wider than the terminal."""
-MOST = 10_000
-"""Wider than any table."""
 
 
 def print_json(document: Any) -> None:
@@ -84,35 +79,12 @@ def show_results(folder: Path, wide: bool = False, columns: Sequence[str] | None
 
 
 def show_short_table(table: ShortTable) -> None:
-    """Print a sweep's table and its verdict: best values marked, references below a rule, numbers never broken."""
-    from rich.box import HORIZONTALS
+    """Print a sweep's table and its verdict on the terminal."""
     from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
 
-    drawn = Table(box=HORIZONTALS)
-    foldable = 0
-    for place, column in enumerate(table.columns):
-        heading = column.heading.replace(" ", "\n") if len(column.heading) > LEAST_TEXT else column.heading
-        side: Literal["left", "right"] = "left" if column.is_text else "right"
-        drawn.add_column(heading, justify=side, no_wrap=not column.is_text, overflow="fold")
-        longest = max(len(row[place]) for row in table.cells)
-        foldable += max(0, longest - LEAST_TEXT) if column.is_text else 0
-    marked = {place for _, place in table.best}
-    for number, row in enumerate(table.cells):
-        if 0 < number == table.methods:
-            drawn.add_section()
-        marks = ["*" if (number, place) in table.best else " " * (place in marked) for place in range(len(row))]
-        pairs = zip(row, marks, strict=True)
-        drawn.add_row(*(Text(cell + mark, style="bold" if mark == "*" else "") for cell, mark in pairs))
-    console = Console()
-    needed = Console(width=MOST).measure(drawn).maximum - foldable
-    console.print(Text(table.title, style="bold"))
-    Console(width=max(console.width, needed)).print(drawn)
-    notes = ["* best of its column"] * bool(table.best)
-    notes += ["below the rule: references"] * (0 < table.methods < len(table.cells))
-    console.print(Text("; ".join(notes), style="dim"), end="\n" if notes else "")
-    console.print(Text(table.verdict), end="\n\n" if table.verdict else "\n")
+    from merge_cosim.report.text_table import print_short_table
+
+    print_short_table(table, Console())
 
 
 def _text(value: Any) -> str:

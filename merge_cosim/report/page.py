@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from merge_cosim.results.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, ResultF
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
 
 REPORT = "report.html"
+BRIEF_CASES = 3
+"""Recorded cases of each chapter in a page that is shown in a notebook."""
 
 
 @dataclass(frozen=True)
@@ -111,30 +114,50 @@ def write_report(folder: Path, against: str | None = None) -> Path:
     """
     report = read_report(folder, against)
     write_tables(folder, report.tables)
+    file = folder / REPORT
+    file.write_text(report_page(report, ResultFolder(folder).note_lines()), encoding="utf-8")
+    return file
+
+
+def report_page(report: Report, note_lines: Sequence[str] = (), brief: bool = False) -> str:
+    """The page of a report.
+
+    Args:
+        report: What it says.
+        note_lines: What was noted in living traffic.
+        brief: The charts alone, with no more than `BRIEF_CASES` recorded cases of each chapter, for a notebook.
+    """
+    recorded = report.recorded
+    tests = {one.key: one.data for one in report.chapters}
+    if brief:
+        kept = sorted({number for one in report.chapters for number in one.data["cases"][:BRIEF_CASES]})
+        recorded = [recorded[number] for number in kept]
+        tests = {
+            key: data | {"delays": None, "beliefs": None, "cases": [kept.index(n) for n in data["cases"][:BRIEF_CASES]]}
+            for key, data in tests.items()
+        }
     varied = tables.varied_parameters(report.summary)
     data = {
         "methods": page_data.method_looks(looks(report.results["method"])),
-        "tests": {one.key: one.data for one in report.chapters},
-        "variations": [page_data.variation_data(report.summary, *pair) for pair in varied],
-        "cases": report.recorded,
+        "tests": tests,
+        "variations": [] if brief else [page_data.variation_data(report.summary, *pair) for pair in varied],
+        "cases": recorded,
     }
-    file = folder / REPORT
-    page = render(
+    return render(
         "report.html",
+        brief=brief,
         data=data,
-        chapters=report.chapters,
-        recorded=report.recorded,
+        chapters=[replace(one, data=tests[one.key]) for one in report.chapters],
+        recorded=recorded,
         left_out=report.left_out,
         variations=list(report.variations.values()),
         contacts=report.contacts,
         traffic=report.traffic,
-        note_lines=ResultFolder(folder).note_lines(),
+        note_lines=note_lines,
         explained=collisions.explained(report.results),
         provenance=_provenance(report.manifest, report.results),
         papers=(PGM_PAPER, FG_GMM_PAPER),
     )
-    file.write_text(page, encoding="utf-8")
-    return file
 
 
 def _compared(rows: list[dict[str, Any]], results: pd.DataFrame, against: str | None) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from merge_cosim.report.methods import in_order
+from merge_cosim.report.page_data import number
 from merge_cosim.scenarios.methods import is_reference
 
 QUANTITIES = {
@@ -105,9 +106,9 @@ def _outcome(rows: pd.DataFrame, key: tuple[Any, ...]) -> dict[str, Any]:
     return {
         "failed": bool(row["failed"]),
         "outcome": outcome + kind,
-        "delay": round(float(row["delay_s"]), 2),
-        "host_speed_0": round(float(row["host_speed_0"]), 2),
-        "merging_speed_0": round(float(row["merging_speed_0"]), 2),
+        "delay": number(row["delay_s"], 2),
+        "host_speed_0": number(row["host_speed_0"], 2),
+        "merging_speed_0": number(row["merging_speed_0"], 2),
     }
 
 

@@ -1,7 +1,10 @@
 """`Results`: rows, summary, conditions, comparisons, figures and the report of a sweep."""
 
+import json
+
 import pandas as pd
 import pytest
+from lxml import html
 from matplotlib.figure import Figure
 
 import merge_cosim as mc
@@ -15,11 +18,24 @@ def test_rows_and_what_was_run(results):
 
 
 def test_it_shows_itself_as_a_table(results):
-    shown = results.summary().set_index("method")["failures"]
-    assert repr(results).startswith("Results: 96 rows\n")
-    assert results._repr_html_().count("<tr") == 1 + len(shown)
-    for method, line in zip(shown.index, repr(results).splitlines()[2:], strict=True):
-        assert f" {method} " in line
+    failures = results.summary().set_index("method")["failures"]
+    lines = repr(results).splitlines()
+    assert lines[0] == "Results: 96 rows"
+    assert max(map(len, lines)) <= 80
+    rows = {line.split()[0]: line.split() for line in lines if line.startswith(("  acc ", "  pgm "))}
+    assert {method: int(cells[1]) for method, cells in rows.items()} == failures.to_dict()
+
+
+def test_a_notebook_gets_the_table_and_the_interactive_charts(results):
+    bundle = results._repr_mimebundle_()
+    assert bundle["text/plain"] == repr(results)
+    shown = html.fromstring(bundle["text/html"])
+    assert [row.xpath("td")[0].text_content() for row in shown.xpath("//tbody/tr")] == ["acc", "pgm"]
+    page = html.fromstring(shown.xpath("//iframe/@srcdoc")[0])
+    data = json.loads(page.xpath("//script[@id='data']")[0].text)
+    assert data["tests"]["t1"]["map"]["n"].keys() == {"acc", "pgm"}
+    assert all(number < len(data["cases"]) for number in data["tests"]["t1"]["cases"])
+    assert not page.xpath("//section[@id='provenance']")
 
 
 def test_the_cases_for_which_a_condition_holds(results):

@@ -13,7 +13,9 @@ def test_a_case_alone_is_the_case_of_the_sweep(results, tmp_path):
     assert run.row["distance_m"] == pytest.approx(swept["distance_m"], abs=1e-6)
     assert len(pd.read_csv(tmp_path / "trace.csv")) == len(run.trace) == round(swept["end_s"] / 0.1)
     assert "d+0_h17_m17" in repr(run)
-    assert "<table" in run._repr_html_()
+    shown = run._repr_mimebundle_()["text/html"]
+    assert shown.startswith("<table>")
+    assert "id=&quot;viewer&quot;" in shown
 
 
 def test_its_figures():

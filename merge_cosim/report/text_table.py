@@ -1,0 +1,58 @@
+"""The short table of a sweep as text: on the terminal, or wherever text is shown."""
+
+from __future__ import annotations
+
+import io
+from typing import Literal
+
+from rich.box import HORIZONTALS
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from merge_cosim.report.short_table import ShortTable
+
+LEAST_TEXT = 12
+"""Texts of a table are folded to this many characters before a table is made wider than the terminal."""
+MOST = 10_000
+"""Wider than any table."""
+WIDTH = 80
+"""Characters in a line where there is no terminal."""
+
+
+def print_short_table(table: ShortTable, console: Console) -> None:
+    """Print a sweep's table and its verdict: best values marked, references below a rule, numbers never broken."""
+    drawn = Table(box=HORIZONTALS)
+    foldable = 0
+    for place, column in enumerate(table.columns):
+        heading = column.heading.replace(" ", "\n") if len(column.heading) > LEAST_TEXT else column.heading
+        side: Literal["left", "right"] = "left" if column.is_text else "right"
+        drawn.add_column(heading, justify=side, no_wrap=not column.is_text, overflow="fold")
+        longest = max(len(row[place]) for row in table.cells)
+        foldable += max(0, longest - LEAST_TEXT) if column.is_text else 0
+    marked = {place for _, place in table.best}
+    for number, row in enumerate(table.cells):
+        if 0 < number == table.methods:
+            drawn.add_section()
+        marks = ["*" if (number, place) in table.best else " " * (place in marked) for place in range(len(row))]
+        pairs = zip(row, marks, strict=True)
+        drawn.add_row(*(Text(cell + mark, style="bold" if mark == "*" else "") for cell, mark in pairs))
+    needed = Console(width=MOST).measure(drawn).maximum - foldable
+    console.print(Text(table.title, style="bold"))
+    width = console.width
+    console.width = max(width, needed)
+    console.print(drawn)
+    console.width = width
+    notes = ["* best of its column"] * bool(table.best)
+    notes += ["below the rule: references"] * (0 < table.methods < len(table.cells))
+    console.print(Text("; ".join(notes), style="dim"), end="\n" if notes else "")
+    console.print(Text(table.verdict), end="\n\n" if table.verdict else "\n")
+
+
+def as_text(tables: list[ShortTable]) -> str:
+    """The same as plain text."""
+    file = io.StringIO()
+    console = Console(file=file, width=WIDTH, color_system=None)
+    for table in tables:
+        print_short_table(table, console)
+    return file.getvalue().rstrip()
