@@ -23,7 +23,7 @@ lint: $(VENV)/installed
 	$(BIN)/lint-imports
 
 docs: out/venv-docs/installed
-	out/venv-docs/bin/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 out/venv-docs/bin/mkdocs build --strict --quiet
 	@echo "open out/site/index.html"
 
 clean:
