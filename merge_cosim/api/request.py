@@ -44,6 +44,7 @@ def request_of(
     dask: str | None = None,
     world: WorldKind = "sumo",
     traces: str | int | None = None,
+    unchecked_ramp: bool = False,
 ) -> SweepRequest:
     """Make a request; the arguments are those of `merge_cosim.sweep`.
 
@@ -65,6 +66,7 @@ def request_of(
         dask=dask,
         against=against,
         world=world,
+        unchecked_ramp=unchecked_ramp,
         traces=parse_traces(traces),
     )
 

@@ -19,7 +19,7 @@ from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.sumo.attach import Address
 from merge_cosim.sumo.outputs import SumoOutputs
-from merge_cosim.sweeps.plan import plan
+from merge_cosim.sweeps.plan import plan, refuse_unsound_ramps
 from merge_cosim.sweeps.single import NO_OUTPUTS, case_alone, trace_case
 from merge_cosim.sweeps.task import Task
 
@@ -169,6 +169,7 @@ def run(
     outputs: SumoOutputs = NO_OUTPUTS,
     attach: str | None = None,
     stays: bool = True,
+    unchecked_ramp: bool = False,
 ) -> Run:
     """Run one case alone; its outcome is the same as in a sweep.
 
@@ -192,6 +193,7 @@ def run(
         delay: With `gui`: milliseconds per step; 100 is real time.
         trace: File to write the trace to (.csv or .parquet).
         outputs: Files that SUMO is to write.
+        unchecked_ramp: Run on a ramp that does not pass `ramp check`, too, which is refused otherwise.
         attach: `HOST:PORT` of a SUMO that runs with `--remote-port`, to drive in that one.
         stays: With `gui`: the window stays until it is closed by hand.
 
@@ -211,11 +213,14 @@ def run(
         seed=seed,
         plugins=plugins,
         world=world,
+        unchecked_ramp=unchecked_ramp,
     )
     if trace is not None and Path(trace).suffix not in (".csv", ".parquet"):
         raise UserError(f"{trace}: a trace is written as .csv or .parquet")
     address = Address.parse(attach) if attach else None
-    task = case_alone(plan(request), case)
+    tasks = plan(request)
+    refuse_unsound_ramps(request, tasks)
+    task = case_alone(tasks, case)
     row, record = trace_case(task, case, delay if gui else None, outputs, address, stays)
     if trace is not None:
         Path(trace).parent.mkdir(parents=True, exist_ok=True)

@@ -38,6 +38,7 @@ def sweep(
     overwrite: bool = False,
     add: bool = False,
     traces: Literal["all", "failed", "telling"] | int | None = None,
+    unchecked_ramp: bool = False,
     progress: bool = True,
 ) -> Results:
     """Run every case of some scenarios under some methods.
@@ -74,6 +75,7 @@ def sweep(
         traces: Cases of each scenario that are recorded cycle by cycle, to be watched in the report: `"all"`,
             `"failed"`, `"telling"` (the methods disagree; up to 200), or a number of them, the most telling first. A
             few telling ones, if not given. With `add` and nothing else new, traces are added to a finished sweep.
+        unchecked_ramp: Run on a ramp that does not pass `ramp check`, too, which is refused otherwise.
         progress: Show how far the sweep is, on standard error.
 
     Returns:
@@ -98,6 +100,7 @@ def sweep(
         dask=dask,
         world=world,
         traces=traces,
+        unchecked_ramp=unchecked_ramp,
     )
     results = Results(tempfile.mkdtemp(prefix="merge-cosim-"), temporary=True) if out is None else Results(out)
     with sweep_progress(progress) as told:

@@ -56,6 +56,9 @@ World = Annotated[
     Literal["sumo", "closed-form"],
     typer.Option(help="What moves the cars: SUMO, or s' = s + v dt (many times faster; pairs only)."),
 ]
+UncheckedRamp = Annotated[
+    bool, typer.Option("--unchecked-ramp", help="Run on a ramp that does not pass 'ramp check', too.")
+]
 Host = Annotated[
     Literal["main", "ramp"] | None,
     typer.Option(help="Where the automated car drives, with the other car on the other path; as --set host=..."),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -9,7 +11,8 @@ from typing import Any
 import sumolib
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.ramps.build import built, config
+from merge_cosim.core.files import cache_folder, from_cache
+from merge_cosim.ramps.build import PLAIN, built, config
 from merge_cosim.ramps.definition import FILE_NAME, RampFile, read_ramp_file
 from merge_cosim.ramps.paths import MAX_TURN, turn
 from merge_cosim.ramps.ramp import Ramp, missing_lanes, read_net
@@ -54,6 +57,28 @@ def check(folder: Path) -> list[str]:
     own += [] if file.described else _lengths(net, file)
     own += _extensions(file) + _mapping(net, file)
     return [f"{folder / FILE_NAME}: {problem}" for problem in own] + _sources(folder, file)
+
+
+def refuse_unsound(folder: Path) -> None:
+    """Refuse a ramp that does not pass `check`, whose outcome is kept in the cache for as long as its files stay.
+
+    Raises:
+        UserError: It does not pass; the line names the first problem.
+    """
+    named = folder / FILE_NAME, folder / read_ramp_file(folder).net, folder / "site.toml", Path(__file__)
+    plain = [file for kind in PLAIN for file in folder.glob(f"*.{kind}.xml")]
+    held = hashlib.sha256()
+    for file in filter(Path.is_file, (*named, *sorted(plain), *sorted(folder.glob("*.netccfg")))):
+        held.update(f"{file.name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n".encode())
+    place = cache_folder("checks") / f"{held.hexdigest()[:16]}.json"
+    from_cache(place, lambda made: made.write_text(json.dumps([str(folder), check(folder)]), encoding="utf-8"))
+    then, problems = json.loads(place.read_text(encoding="utf-8"))
+    if problems:
+        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        raise UserError(
+            f"{problems[0].replace(then, str(folder))}{more}: see merge-cosim ramp check {folder}; "
+            "--unchecked-ramp runs it all the same"
+        )
 
 
 def _of_encounters(net: sumolib.net.Net, file: RampFile, ramp: Ramp) -> list[str]:

@@ -104,6 +104,16 @@ class Configuration:
             if _is_host(one) or one.get("type") in types or (one.tag != "flow" and one.get("id") == host)
         )
 
+    def departures(self) -> dict[str, float]:
+        """When each vehicle is to depart [s], for those with a time of their own; flows are not in it."""
+        found = {}
+        for one in self._elements("vehicle", "trip"):
+            try:
+                found[one.get("id", "")] = float(sumolib.miscutils.parseTime(one.get("depart", "")))
+            except ValueError:  # triggered by something else
+                continue
+        return found
+
     def require(self, host: str) -> None:
         """Refuse a host's name that stands nowhere in the files.
 

@@ -28,6 +28,7 @@ from merge_cosim.simulation.worlds.base import World, WorldKind
 from merge_cosim.simulation.worlds.logged import LoggedWorld, Place
 from merge_cosim.simulation.worlds.logged_host import LoggedHostWorld
 from merge_cosim.simulation.worlds.logged_rules import FullScene
+from merge_cosim.simulation.worlds.notes import Event
 from merge_cosim.simulation.worlds.scene import Scene
 from merge_cosim.simulation.worlds.tiles import TiledWorld
 from merge_cosim.sumo.attach import Address, AttachedSession
@@ -228,6 +229,30 @@ class PairCases(Cases):
                 world.close()
 
 
+_NOTHING = (Event.NO_HOST, Event.HOST_NOT_DEPARTED, Event.NO_MERGING, Event.NOT_DEPARTED)
+"""What makes a scene one without a meeting."""
+
+
+def refuse_empty(facts: Facts, where: str) -> None:
+    """Refuse scenes of which none has a meeting, so that there is nothing to measure.
+
+    Args:
+        facts: The scenes' facts; none for pairs.
+        where: What error lines call them.
+
+    Raises:
+        UserError: There are scenes, and no meeting.
+    """
+    if not facts or any(one["meetings"] for one in facts):
+        return
+    told: dict[str, str] = {}
+    for event, line in facts[0]["notes"]:
+        told.setdefault(event, line)
+    causes = [told[event] for event in _NOTHING if event in told]
+    why = "; ".join(causes) or "hosts and merging cars never came near each other"
+    raise UserError(f"{where}: nothing to measure: {why}")
+
+
 def no_facts(run: Run) -> Facts:
     """Of encounters of pairs."""
     return []
@@ -381,7 +406,10 @@ class TrafficCases(Cases):
         ):
 
             def facts(run: Run) -> Facts:
-                world.note_absent(scene.announced if options.attach is None else ())
+                if options.attach is None:
+                    world.note_absent(scene.announced, scene.departures)
+                else:
+                    world.note_absent()
                 run.effort.scene_s = world.time - world.begun_at
                 notes = [(str(event), line) for event, line in world.notes.lines]
                 return [{"scene": scene.name, "seed": scene.seed, **scene.facts(world), "notes": notes}]
@@ -394,6 +422,7 @@ class TrafficCases(Cases):
         traffic = self.traffic
         with tempfile.TemporaryDirectory(prefix="merge-cosim-") as folder:
             announced: tuple[str, ...] = ()
+            departures: dict[str, float] = {}
             if isinstance(traffic, Traffic):
                 file = write_traffic(Path(folder), traffic.demand, ramp)
                 end, warm_up = traffic.demand.duration, traffic.demand.warm_up
@@ -401,6 +430,7 @@ class TrafficCases(Cases):
                 file, warm_up = traffic.file, 0.0
                 configuration = Configuration.read(file)
                 end, announced = traffic.end or configuration.end, configuration.hosts(traffic.host)
+                departures = configuration.departures()
             yield Scene(
                 name=self.name(0),
                 file=file,
@@ -410,5 +440,6 @@ class TrafficCases(Cases):
                 warm_up=warm_up,
                 host=traffic.host,
                 announced=announced,
+                departures=departures,
                 attention=traffic.attention,
             )

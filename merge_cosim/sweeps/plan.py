@@ -14,7 +14,8 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import load_plugin
 from merge_cosim.core.units import IntArray
 from merge_cosim.estimators.learned.model import IntentionModel, load_models
-from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.ramps.check import refuse_unsound
+from merge_cosim.ramps.ramp import Ramp, find_ramp
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.scenarios.encounters import SourceChoice, load_encounters
 from merge_cosim.scenarios.logged_scenes import load_scenes
@@ -65,6 +66,7 @@ class SweepRequest:
         dask: Address of a Dask scheduler, or `local`; None for processes of this machine.
         against: Method that the others are compared with on the same cases; None for pgm, if it is there.
         world: What moves the cars.
+        unchecked_ramp: Run on ramps that do not pass `ramps.check`, too.
         traces: Cases that are recorded cycle by cycle, see `sweeps.traces.Traces`.
     """
 
@@ -82,6 +84,7 @@ class SweepRequest:
     dask: str | None = None
     against: str | None = None
     world: WorldKind = "sumo"
+    unchecked_ramp: bool = False
     traces: Literal["all", "failed", "telling"] | int | None = None
 
 
@@ -120,6 +123,16 @@ def plan(request: SweepRequest) -> list[Task]:
     return sorted(
         tasks, key=lambda task: tuple(task.names[name] for name in ("scenario", "variation", "method", "model"))
     )
+
+
+def refuse_unsound_ramps(request: SweepRequest, tasks: Sequence[Task]) -> None:
+    """Refuse ramps that do not pass `ramps.check`, unless the user wants them all the same.
+
+    Raises:
+        UserError: One does not.
+    """
+    for ramp in () if request.unchecked_ramp else dict.fromkeys(task.scenario.ramp for task in tasks):
+        refuse_unsound(find_ramp(ramp))
 
 
 def tasks_of(

@@ -18,7 +18,7 @@ from merge_cosim.sumo.demand import write_traffic
 from merge_cosim.sumo.outputs import SumoOutputs
 from merge_cosim.sumo.routes import write_encounter
 from merge_cosim.sumo.start import QUIT, connection_kept
-from merge_cosim.sweeps.cases import RunOptions, TrafficCases
+from merge_cosim.sweeps.cases import RunOptions, TrafficCases, refuse_empty
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.task import Task
 from merge_cosim.sweeps.worker_session import WorkerSession
@@ -68,6 +68,7 @@ def trace_case(
     if "/" in case:
         few = f" (such as {', '.join(list(rows)[:3])})" if rows else ""
         raise UserError(f"scenario {task.scenario.name}: no encounter '{case}' is scored under {task.method.name}{few}")
+    refuse_empty(facts, f"scenario {task.scenario.name}")
     records = [trace.assign(case=name) for name, trace in run.traces.items()]
     return {**task.names, **facts[0]}, pd.concat(records or [pd.DataFrame()], ignore_index=True)
 

@@ -34,11 +34,12 @@ from merge_cosim.results.store import (
 from merge_cosim.scenarios.methods import ORACLE_BEST
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.adding import joined, missing
+from merge_cosim.sweeps.cases import refuse_empty
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
 from merge_cosim.sweeps.executors import executor_for
 from merge_cosim.sweeps.forecast import TELL_S, forecast, seconds
 from merge_cosim.sweeps.identity import identity
-from merge_cosim.sweeps.plan import SweepRequest, plan
+from merge_cosim.sweeps.plan import SweepRequest, plan, refuse_unsound_ramps
 from merge_cosim.sweeps.single_timing import time_single_cases
 from merge_cosim.sweeps.task import Task
 from merge_cosim.sweeps.traces import record
@@ -108,6 +109,7 @@ def sweep(
     if add:  # the method to compare with may be one of the folder's
         request = replace(request, methods=request.methods or before["methods"], against=None)
     tasks = every = plan(request)
+    refuse_unsound_ramps(request, tasks)
     what = identity(request, tasks)
     earlier = _Earlier()
     if add:
@@ -133,7 +135,8 @@ def sweep(
     folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
     folder.begin_traces(keep=add)
     record(request, every, folder, earlier.recorded, progress)
-    _sum_up(tasks, folder, folder.scenes(), tally, reference_of(what["methods"], what["against"]), earlier)
+    scenes = folder.scenes()
+    _sum_up(tasks, folder, scenes, tally, reference_of(what["methods"], what["against"]), earlier)
     effort, run_s = tally.effort, ran - planned
     manifest = {
         **what,
@@ -165,6 +168,8 @@ def sweep(
     }
     folder.write_json(MANIFEST, manifest)
     folder.finish()
+    if all(task.cases.scenes for task in every):
+        refuse_empty(scenes, f"{out}: {', '.join(dict.fromkeys(task.scenario.name for task in every))}")
     return manifest
 
 

@@ -115,8 +115,8 @@ def test_a_host_that_nobody_is(tmp_path: Path) -> None:
     several = merge_cosim(*how, "--set", "encounters.host=DEFAULT_VEHTYPE", cwd=tmp_path)
     assert "it stands for several types; choose one: truck, passenger" in several.stderr
     none = merge_cosim(*how, "--set", "encounters.host=onramp", "--out", "none", cwd=tmp_path)
-    assert none.returncode == 0
-    assert "without_host: 1, such as: no host came in that drives along the main road" in none.stderr
+    assert none.returncode == 2
+    assert "none: ramp: nothing to measure: no host came in that drives along the main road" in none.stderr
 
 
 @pytest.mark.parametrize(("kept", "expected"), [(5000, "us101.net.xml: not a SUMO net"), (0, "us101.net.xml: not XML")])

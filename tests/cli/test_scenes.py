@@ -193,14 +193,46 @@ def test_a_mistake_that_sumo_meets_on_the_way(tmp_path):
     assert "nowhere" in done.stderr
 
 
+def car(name, depart, edges):
+    kind = "host" if name.startswith("h") else "car"
+    lane = f'departLane="0" departSpeed="15"><route edges="{edges} weave main_out"/></vehicle>'
+    return f'<vehicle id="{name}" type="{kind}" depart="{depart}" {lane}'
+
+
+HEAD = '<routes><vType id="host"><param key="merge-cosim.role" value="host"/></vType><vType id="car"/>'
+
+
+def test_vehicles_that_sumo_leaves_out_of_an_unsorted_file_are_counted(tmp_path):
+    cars = [car("h1", 5, "main_in"), car("m1", 6, "ramp"), car("late", 1, "main_in"), car("m2", 2, "ramp")]
+    own_files(tmp_path, HEAD + "".join(cars) + "</routes>", '<end value="60"/>')
+    _, done = swept(tmp_path, "my.sumocfg", "--method", "acc")
+    assert "vehicles_not_departed: 2, such as: vehicle late never departed: SUMO left it out" in done.stderr
+    (tmp_path / "my.rou.xml").write_text(HEAD + "".join(cars[2:] + cars[:2]) + "</routes>")
+    _, done = swept(tmp_path, "my.sumocfg", "--method", "acc", out="sorted")
+    assert "not_departed" not in done.stderr
+
+
+@pytest.mark.parametrize("how", [("sweep",), ("run", "--case", "000")])
+def test_a_scene_without_a_car_that_is_to_merge_is_one_line(tmp_path, how):
+    cars = [car("h1", 5, "main_in"), car("o", 6, "main_in")]
+    own_files(tmp_path, HEAD + "".join(cars) + "</routes>", '<end value="60"/>')
+    done = merge_cosim(how[0], "my.sumocfg", "--method", "acc", *how[1:], cwd=tmp_path)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert "nothing to measure: no car came in that is to merge: none drives over the on-ramp" in done.stderr
+
+
 def test_hosts_that_never_depart_are_told(tmp_path):
     blocked = '<vehicle id="block" type="car" depart="0" departLane="0" departPos="8" departSpeed="0" route="main">'
     blocked += '<stop lane="main_in_0" endPos="9" duration="1000"/></vehicle><flow id="joining"'
     late = '<vehicle id="late" type="host" depart="61" route="main"/></routes>'
     routes = ROUTES.replace('<flow id="joining"', blocked, 1).replace("</routes>", late)
     own_files(tmp_path, routes, '<end value="60"/>')
-    out, done = swept(tmp_path, "my.sumocfg", "--method", "acc")
-    assert "hosts_not_departed: 9, such as: host h.0 never departed" in done.stderr
+    done = merge_cosim("sweep", "my.sumocfg", "--method", "acc", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "out: my: nothing to measure: no host came in" in done.stderr
+    assert "; host h.0 never departed: no room where it was to enter" in done.stderr
+    out = tmp_path / "out"
+    assert len([note for note in table(out / "notes.csv") if note["event"] == "hosts_not_departed"]) == 9
     assert "host late never departed: not in the scene's time" in (out / "notes.csv").read_text()
     assert len(rows(out)) == 0
     report = merge_cosim("report", out, cwd=tmp_path)

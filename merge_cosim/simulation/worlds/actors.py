@@ -58,6 +58,8 @@ class Actors:
     Attributes:
         hosts, merging: Those in the net, by SUMO's id; a merging car is forgotten once `forget` says so.
         came: Names of all hosts that have come in so far.
+        merging_came: Number of merging cars that have.
+        departed: Names of all vehicles that have come in so far.
     """
 
     def __init__(self, session: Session, lanes: LaneMap, host: str = "") -> None:
@@ -68,6 +70,8 @@ class Actors:
         self.hosts: dict[str, Actor] = {}
         self.merging: dict[str, Actor] = {}
         self.came: set[str] = set()
+        self.merging_came = 0
+        self.departed: set[str] = set()
         self._roles_merging = any(self._type_role(kind) == "merging" for kind in session.kinds())
         for name in session.vehicles():
             self._enter(name)
@@ -115,12 +119,14 @@ class Actors:
         return "merging" if self._lanes.comes_by_ramp(session.route(name)) else ""
 
     def _enter(self, name: str) -> None:
+        self.departed.add(name)
         role = self.role(name)
         if role not in ("host", "merging"):
             return
         actor = Actor(name, self._session.length(name))
         if role == "merging":
             self.merging[name] = actor
+            self.merging_came += 1
             return
         self.hosts[name] = actor
         self.came.add(name)

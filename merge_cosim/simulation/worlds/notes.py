@@ -10,6 +10,8 @@ class Event(StrEnum):
     """What is noted."""
 
     NO_HOST = "without_host"
+    NO_MERGING = "without_merging"
+    NOT_DEPARTED = "vehicles_not_departed"
     HOST_NOT_DEPARTED = "hosts_not_departed"
     HOST_OFF_LANE = "hosts_off_lane"
     TWO_HOSTS = "two_hosts"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,7 @@ class Scene:
         warm_up: The throughput is counted from here on [s].
         host: A vehicle, flow or type that is a host without saying so.
         announced: Ids of vehicles and flows that are hosts by the files.
+        departures: When the vehicles of the files are to depart [s].
         attention: Which merging cars a host attends to.
     """
 
@@ -52,6 +53,7 @@ class Scene:
     warm_up: float = 0.0
     host: str = ""
     announced: tuple[str, ...] = ()
+    departures: Mapping[str, float] = field(default_factory=dict)
     attention: Attention = DEFAULT_ATTENTION
 
     @contextmanager

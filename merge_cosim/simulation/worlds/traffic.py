@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from time import perf_counter
 
 import numpy as np
@@ -32,6 +32,9 @@ BLOCK = 32
 """Slots that are added at a time."""
 LEAST_STATES = 2
 """A meeting that is to be scored has been seen to move."""
+LATE = 1.0
+"""A vehicle that is to depart in the last second of a scene may not have come in [s]."""
+_NO_DEPARTURES: Mapping[str, float] = {}
 _NOBODY = np.array([-1e3, -1e3, 10.0, 10.0])
 """State of a slot without a meeting: far away, and finite."""
 _X = ("host_x_m", "merging_x_m")
@@ -250,11 +253,12 @@ class TrafficWorld(World):
             track[row] = x - point
         return track
 
-    def note_absent(self, announced: Iterable[str] = ()) -> None:
-        """Note the hosts that never came in, or that there were none, and cars that SUMO took out.
+    def note_absent(self, announced: Iterable[str] = (), departures: Mapping[str, float] = _NO_DEPARTURES) -> None:
+        """Note the hosts and other vehicles that never came in, that there were none, and cars that SUMO took out.
 
         Args:
             announced: Ids of vehicles and flows that are hosts by SUMO's files.
+            departures: When the vehicles of SUMO's files are to depart [s].
         """
         waiting = [one for one in self.session.pending() if self._actors.role(one) == "host"]
         for name in waiting:
@@ -264,11 +268,19 @@ class TrafficWorld(World):
         for name in sorted(set(announced) - known - {one.rpartition(".")[0] for one in known}):
             line = f"host {name} never departed: not in the scene's time, or its file is not sorted by time"
             self.notes.add(Event.HOST_NOT_DEPARTED, name, line)
+        missing = departures.keys() - self._actors.departed - known - set(announced) - set(self.session.pending())
+        for name in sorted(name for name in missing if self.begun_at <= departures[name] < self.time - LATE):
+            line = (
+                f"vehicle {name} never departed: SUMO left it out, as where its file is not sorted by time of departure"
+            )
+            self.notes.add(Event.NOT_DEPARTED, name, line)
         # With time-to-teleport.remove SUMO takes cars out without saying which.
         for number in range(self._teleported() - self._teleports - self.notes.counts()[Event.TELEPORT]):
             self.notes.add(Event.TELEPORT, f"removed {number}", "SUMO took out a vehicle that had waited too long")
         if not self.host_count:
             self.notes.add(Event.NO_HOST, "", "no host came in that drives along the main road past the gore")
+        if not self._actors.merging_came:
+            self.notes.add(Event.NO_MERGING, "", "no car came in that is to merge: none drives over the on-ramp")
 
     def _ended(self, gone: list[Meeting], age: IntArray, back: int) -> Ended | None:
         if not gone:
