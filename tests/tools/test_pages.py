@@ -49,10 +49,13 @@ def test_ranking(tmp_path):
     assert "| slot-time |" in text
 
 
-def test_robustness(tmp_path):
+def test_robustness(tmp_path, monkeypatch):
+    for name in ("SENSING", "SHIFTED"):
+        words = ["acc,pgm" if word.startswith("acc,") else word for word in getattr(robustness_page, name)]
+        monkeypatch.setattr(robustness_page, name, words)
     robustness_page.main(["--short", "--docs", str(tmp_path)])
     assert made_like(tmp_path, "sensors.md").count("| `sensing.") == 13
-    assert made_like(tmp_path, "tests.md").count("%, ") >= 5 * 10
+    assert made_like(tmp_path, "tests.md").count("%, ") >= 2 * 10
 
 
 def test_headroom(tmp_path):
