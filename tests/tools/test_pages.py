@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import blocks
 import geometry_page
 import headroom_page
 import kept_aside_page
@@ -33,6 +34,22 @@ def made_like(docs: Path, name: str) -> str:
         # made elsewhere: a screenshot, and the pictures of another tool
         assert target.is_file() or link == "img/full-scene.png" or link.startswith("img/headroom-")
     return text
+
+
+def test_an_edit_made_while_blocks_are_filled_stays(tmp_path, monkeypatch):
+    monkeypatch.setattr(blocks, "DOCS", tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text(
+        "before\n<!-- sum: a -->\nold\n<!-- end -->\n<!-- other: b -->\nkept\n<!-- end -->\n", encoding="utf-8"
+    )
+
+    def made(argument: str) -> str:
+        page.write_text(page.read_text(encoding="utf-8").replace("before", "after"), encoding="utf-8")
+        return f"{argument} new\n"
+
+    blocks.fill_page("page.md", tmp_path, {"sum": made})
+    expected = "after\n<!-- sum: a -->\na new\n<!-- end -->\n<!-- other: b -->\nkept\n<!-- end -->\n"
+    assert page.read_text(encoding="utf-8") == expected
 
 
 def test_sensitivity(tmp_path):
