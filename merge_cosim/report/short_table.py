@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow.compute as pc
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
@@ -16,9 +17,10 @@ from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.comparison import MEASURES, SIDES
 from merge_cosim.report.traffic_table import traffic_table
+from merge_cosim.results.files import readable
 from merge_cosim.results.statistics.summary import SECTION, is_sample
 from merge_cosim.results.statistics.verdict import verdicts
-from merge_cosim.results.store import MANIFEST, SUMMARY_JSON, ResultFolder
+from merge_cosim.results.store import MANIFEST, RESULTS, SUMMARY_JSON, ResultFolder
 from merge_cosim.scenarios.methods import is_reference
 
 COLUMNS = (
@@ -102,12 +104,12 @@ def short_tables(path: Path, wide: bool = False, columns: Sequence[str] = ()) ->
         UserError: There is no finished sweep, or no such column.
     """
     folder = ResultFolder(path)
-    rows = folder.results(ROWS)
+    folder.check()
     manifest = folder.read_json(MANIFEST)
     summary = pd.DataFrame(folder.read_json(SUMMARY_JSON))
     if not len(summary):
         return []
-    judged = verdicts(summary, rows.to_pandas() if is_sample(summary) else None)
+    judged = verdicts(summary, rows_of_failures(folder) if is_sample(summary) else None)
     ends = zip(summary["ci_low_pct"], summary["ci_high_pct"], strict=True)
     labels = ["", *(f"{name}={value}" for name, values in manifest["variations"] for value in values)]
     ready = summary.assign(
@@ -130,6 +132,17 @@ def short_tables(path: Path, wide: bool = False, columns: Sequence[str] = ()) ->
         said = f"Without variation: {sentence}" if varied else sentence
         tables.append(_table(scenario, about, part, shown, said, columns))
     return tables
+
+
+def rows_of_failures(folder: ResultFolder) -> pd.DataFrame:
+    """All rows of the cases in which some method failed or got stuck; on the others no two methods differ."""
+    found = []
+    with readable(folder.path / RESULTS):
+        for scenario, variation in folder.groups():
+            for rows in folder.batches(scenario, variation, ROWS) if not variation else ():
+                bad = rows.filter(pc.or_(rows["failed"], rows["stuck"]))
+                found.append(rows.filter(pc.is_in(rows["case"], pc.unique(bad["case"]))).to_pandas())
+    return pd.concat(found, ignore_index=True) if found else pd.DataFrame(columns=ROWS)
 
 
 def traffic_tables(path: Path, wide: bool = False) -> list[ShortTable]:

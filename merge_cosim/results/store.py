@@ -333,10 +333,13 @@ class ResultFolder:
         )
         return sum(file.metadata.row_group(number).num_rows for file, number in groups)
 
+    def _files(self) -> list[Path]:
+        whole = self.path / RESULTS
+        return sorted(whole.glob("*.parquet")) if whole.is_dir() else [whole]
+
     def _row_groups(self) -> Iterator[tuple[pq.ParquetFile, int]]:
         """The groups of rows of the merged files, in their order; each is of one scenario and variation."""
-        whole = self.path / RESULTS
-        for path in sorted(whole.glob("*.parquet")) if whole.is_dir() else [whole]:
+        for path in self._files():
             with pq.ParquetFile(path, page_checksum_verification=True) as file:
                 for number in range(file.num_row_groups):
                     yield file, number
@@ -415,17 +418,26 @@ class ResultFolder:
         Raises:
             UserError: There are none, a sweep into this folder is not finished, or another version wrote them.
         """
+        self.check()
+        return read_table(self.path / RESULTS, columns)
+
+    def check(self) -> None:
+        """See that the rows of a finished sweep are here, and can be understood; none of them is read.
+
+        Raises:
+            UserError: See `results`.
+        """
         file = self.path / RESULTS
         if self._plan.is_file():  # what else is here may be of an earlier sweep
             raise UserError(f"{self.path}: holds an unfinished sweep; if that runs no more, finish it with --resume")
         if not file.exists():
             raise UserError(f"{file}: no results here; run a sweep first")
-        rows = read_table(file, columns)
-        version = (rows.schema.metadata or {}).get(VERSION_KEY, b"none").decode()
-        if version != SCHEMA_VERSION:
-            raise UserError(f"{file}: result schema {version}, expected {SCHEMA_VERSION}; run the sweep again")
-        require(file, rows.schema, [column for column in SCHEMA if not columns or column.name in columns])
-        return rows
+        for one in self._files():
+            held = read_schema(one)
+            version = (held.metadata or {}).get(VERSION_KEY, b"none").decode()
+            if version != SCHEMA_VERSION:
+                raise UserError(f"{file}: result schema {version}, expected {SCHEMA_VERSION}; run the sweep again")
+            require(one, held, SCHEMA)
 
     def read_json(self, name: str) -> Any:
         """Read one JSON file of the folder.
