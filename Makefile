@@ -1,14 +1,17 @@
 # make demo: the main job. make test: the tests. Both make the virtual environment first, with nothing but python3.
 PYTHON ?= python3
 VENV := .venv
-DEMO := acc,slot,ipcb,pgm-g,pgm,pgm-symmetric,fg,fg-gmm,dbn-pf,interactive,always-go,always-yield,oracle-best
+DEMO := --method acc,slot,ipcb,pgm-g,pgm,pgm-symmetric,fg,fg-gmm,dbn-pf,interactive,always-go,always-yield,oracle-best \
+	--world closed-form --source surrogate --out out/demo
 BIN := $(VENV)/bin
 
 .PHONY: demo test coverage lint docs clean
 
 demo: $(VENV)/installed
-	$(BIN)/merge-cosim sweep designed-2 --method $(DEMO) --world closed-form --verify 0.005 --out out/demo --overwrite
+	$(BIN)/merge-cosim sweep designed-2 $(DEMO) --verify 0.005 --overwrite
+	$(BIN)/merge-cosim sweep us101-replay $(DEMO) --add
 	$(BIN)/merge-cosim report out/demo
+	@$(BIN)/merge-cosim summary out/demo --verdict
 
 test: $(VENV)/installed
 	$(BIN)/pytest -n auto --dist worksteal

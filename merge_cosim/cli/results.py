@@ -64,6 +64,7 @@ def summary(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
     wide: Wide = False,
     columns: Columns = None,
+    verdict: Annotated[bool, typer.Option("--verdict", help="Show the verdicts alone.")] = False,
     json: Json = False,
 ) -> None:
     """Show the table and the verdict of a finished sweep again."""
@@ -71,6 +72,11 @@ def summary(
 
     if json:
         print_json(ResultFolder(folder).read_json(SUMMARY_JSON))
+    elif verdict:
+        from merge_cosim.report.short_table import short_tables
+
+        for table in short_tables(folder):
+            typer.echo(f"{table.title}: {table.verdict}")
     else:
         show_results(folder, wide, columns)
 

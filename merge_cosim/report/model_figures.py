@@ -84,11 +84,11 @@ def arrival_figure(model: IntentionModel, uniform: float = Pgm().uniform) -> Fig
         for ax, i in zip(axes, (Intention.YIELD, Intention.NOT_YIELD), strict=False):
             shown = ax.imshow(both[i], origin="lower", extent=extent, cmap="viridis", vmin=0, vmax=both.max())
             ax.set_title(f"{NAMES[i]} ({model.pairs[i]} pairs)")
-        figure.colorbar(shown, ax=axes[:2], label="density [1/s²]", shrink=0.8)
+        figure.colorbar(shown, ax=axes[:2], label="density [1/s²]", shrink=0.6)
         top = float(np.abs(odds).max())
         shown = axes[2].imshow(odds, origin="lower", extent=extent, cmap="RdBu_r", vmin=-top, vmax=top)
         axes[2].set_title("log-odds of not yield")
-        figure.colorbar(shown, ax=axes[2], shrink=0.8)
+        figure.colorbar(shown, ax=axes[2], shrink=0.6)
         for ax in axes:
             ax.plot([0, LONGEST_TIME], [0, LONGEST_TIME], color="#999999", lw=0.8, ls=":")
             ax.grid(False)

@@ -38,7 +38,7 @@ def run_command(row: Mapping[Hashable, Any], manifest: Mapping[str, Any]) -> str
     if row["source"] in ("ngsim", "recorded", TRAFFIC) and command["data"] and find_data(None) != Path(command["data"]):
         words += ["--data", command["data"]]
     for name in manifest["plugins"]:
-        words += ["--plugin", name]
+        words += ["--plugin", command.get("plugins", {}).get(name, name)]
     return shlex.join(words)
 
 

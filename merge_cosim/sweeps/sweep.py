@@ -151,6 +151,10 @@ def sweep(
             "traces": request.traces,
             "scenarios": sorted({*before.get("command", {}).get("scenarios", []), *_files(request)}),
             "data": str(request.data) if request.data else None,
+            "plugins": {
+                **before.get("command", {}).get("plugins", {}),
+                **{plugin.name: str(plugin) for plugin in request.plugins},
+            },
         },
         "invariants": folder.invariants(),
         "wall_s": round(perf_counter() - begin, 3),

@@ -82,7 +82,7 @@ def run(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
         return _merge_cosim(words, folder)
     if program == "make":
         told = _process(["make", "--dry-run", *words, "VENV=venv", "BIN=."], ROOT)
-        for each in told.stdout.splitlines():
+        for each in told.stdout.replace("\\\n", " ").splitlines():
             if each.startswith("./merge-cosim "):
                 done = run(each.removeprefix("./"), folder)
                 if done.returncode:
