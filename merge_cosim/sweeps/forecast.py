@@ -9,11 +9,13 @@ from merge_cosim.sweeps.cases import LoggedCases
 from merge_cosim.sweeps.chunks import cut
 from merge_cosim.sweeps.task import Task
 
-PAIR_US = {"sumo": 8.0, "closed-form": 1.0}
+PAIR_US = {"sumo": 11.0, "closed-form": 0.8}
 """Processor time of one encounter and cycle, by world, with a usual estimator [us]."""
+SLOW_US = {"rollout": 9.0}
+"""What some planners add to it [us]."""
 LOGGED_US = 500.0
 """The same among logged cars, which are placed one by one [us]."""
-CAR_US = 5.5
+CAR_US = 7.5
 """Processor time of one car and step of living traffic [us]."""
 PASSAGE_S, USUAL_CARS = 70.0, 50.0
 """Time that a car of generated traffic is on the ramp's net [s], and cars on it where a route file makes them."""
@@ -63,4 +65,5 @@ def _seconds(task: Task) -> float:
             cars = demand.copies * per_hour / 3600.0 * PASSAGE_S
         return 1e-6 * CAR_US * cycles * cars
     each = LOGGED_US if isinstance(task.cases, LoggedCases) else PAIR_US[task.cases.world]
+    each += SLOW_US.get(task.method.controller, 0.0)
     return 0.0 if task.method.is_human else 1e-6 * each * cycles

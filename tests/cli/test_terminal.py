@@ -57,6 +57,14 @@ def test_one_method_fits_and_has_nothing_to_be_best_of(swept):
     assert "No other method to compare with." in " ".join(printed.split())
 
 
+def test_the_verdicts_alone(swept):
+    folder, told = swept
+    line = merge_cosim("summary", "every", "--verdict", cwd=folder).stdout.strip()
+    title, _, verdict = line.partition("): ")
+    assert f"{title})" in told
+    assert verdict in " ".join(told.split())
+
+
 def test_more_columns_and_chosen_ones(swept):
     folder, _ = swept
     wide = merge_cosim("summary", "every", "--wide", cwd=folder).stdout

@@ -24,6 +24,13 @@ def test_a_short_sweep_has_its_cases_told_and_no_time():
     assert seconds(tasks, jobs=1) < 30
 
 
+def test_a_planner_that_costs_more_is_counted_so():
+    slow, usual = (
+        seconds(plan(SweepRequest(["designed-2"], [name], world="closed-form")), 1) for name in ("interactive", "acc")
+    )
+    assert slow > 5 * usual
+
+
 @pytest.mark.parametrize(("time", "words"), [(20, "20 s"), (150, "2 min"), (7200, "2.0 h")])
 def test_times_in_words(time, words):
     assert duration(time) == words
