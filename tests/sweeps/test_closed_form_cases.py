@@ -4,8 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT
+from merge_cosim.scenarios.random_states import RandomStates
 from merge_cosim.sweeps.closed_form_cases import RECORD_BYTES, ClosedFormCases
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.single import case_alone, trace_case
@@ -63,6 +65,20 @@ def test_a_long_time_out_leaves_fewer_side_by_side_and_the_rows_as_they_are():
     assert long.cases.side_by_side < 300
     session = WorkerSession()
     pd.testing.assert_frame_equal(rows(usual, session), rows(long, session), check_exact=True)
+
+
+def test_random_states_are_drawn_beforehand_only_where_the_ramp_has_no_room_for_some():
+    def planned(lowest: float) -> Task:
+        settings = {"encounters.count": 300, "encounters.host_offset": {"from": lowest, "to": 5}}
+        (task,) = plan(SweepRequest(["designed-random"], ["acc"], world="closed-form", settings=settings))
+        return task
+
+    usual, wide = planned(-5.0), planned(-600.0)
+    assert isinstance(usual.cases.pairs, RandomStates)
+    assert isinstance(wide.cases.pairs, Encounters)
+    assert (len(usual), usual.left_out) == (300, ())
+    assert 0 < len(wide.left_out) < 300
+    assert len(wide) + len(wide.left_out) == 300
 
 
 def test_a_case_alone_ends_as_in_its_batch():
