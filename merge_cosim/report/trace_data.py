@@ -72,6 +72,7 @@ def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> list[dict[str
                 "host_speed": first.pop("host_speed_0", None),
                 "merging_speed": first.pop("merging_speed_0", None),
                 "failed": sum(run["failed"] for run in runs if not is_reference(run["method"])),
+                "stuck": sum(run["outcome"] == "stuck" for run in runs if not is_reference(run["method"])),
                 "rivals": sum(not is_reference(run["method"]) for run in runs),
                 "runs": runs,
             }

@@ -279,7 +279,8 @@ def test_mistakes_get_one_line_and_status_2(tmp_path, arguments, expected):
 
 def test_a_plugin_drives_like_ours(tmp_path):
     scenario = small_scenario(tmp_path)
-    (tmp_path / "mine.py").write_text(
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own/mine.py").write_text(
         """
 from dataclasses import dataclass
 from typing import ClassVar
@@ -297,12 +298,25 @@ class Hesitant(Estimator):
         return np.where(seen.host_station - seen.merging_station > self.lead, -1.0, 1.0)
 """
     )
-    listed = merge_cosim("methods", "--plugin", "mine.py", "--json", cwd=tmp_path)
+    listed = merge_cosim("methods", "--plugin", "own/mine.py", "--json", cwd=tmp_path)
     assert "hesitant" in {row["name"] for row in json.loads(listed.stdout)}
-    arguments = ("--plugin", "mine.py", "--method", "hesitant", "--set", "hesitant.lead=2", "--jobs", 2, "--out", "out")
+    arguments = (
+        "--plugin",
+        "own/mine.py",
+        "--method",
+        "hesitant",
+        "--set",
+        "hesitant.lead=2",
+        "--jobs",
+        2,
+        "--out",
+        "out",
+    )
     done = merge_cosim("sweep", scenario, *arguments, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert summary(tmp_path / "out")["hesitant"]["n"] == 75
+    told = merge_cosim("cases", "out", cwd=tmp_path).stdout
+    assert "--plugin own/mine.py" in told  # as it was given, so that the command can be pasted
 
 
 def test_a_plugin_that_breaks_is_named(tmp_path):
