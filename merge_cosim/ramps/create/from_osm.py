@@ -18,7 +18,7 @@ from merge_cosim.ramps.check import COMFORTABLE_BRAKING
 from merge_cosim.ramps.create.folder import require_new
 from merge_cosim.ramps.create.from_net import ramp_from_net
 from merge_cosim.ramps.create.new import RampNumbers
-from merge_cosim.ramps.create.onramp import Origin, choose, read_source, root_element
+from merge_cosim.ramps.create.onramp import Origin, choose, read_source, source_root
 
 KEPT = ("highway.motorway", "highway.motorway_link", "highway.trunk", "highway.trunk_link")
 """Kinds of roads that are read from the extract."""
@@ -68,7 +68,7 @@ def ramp_from_osm(
         UserError: The file is no OSM XML, or `ramp_from_net` finds no ramp in it.
     """
     require_new(folder)
-    root = root_element(extract)
+    root = source_root(extract)
     if root.tag != "osm":
         raise UserError(f"{extract}: its root is <{root.tag}>, not <osm>; a SUMO net goes with --from-net")
     with tempfile.TemporaryDirectory() as scratch:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
 import html
-import zlib
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +11,7 @@ import sumolib
 from lxml import etree
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.xml_file import root_element
 from merge_cosim.ramps.create.new import merging_point_source
 from merge_cosim.ramps.infer import Course, Joint, course, joint_of, joints
 from merge_cosim.ramps.ramp import parsed_net
@@ -35,25 +34,23 @@ class Origin:
     advised: Collection[str] = ()
 
 
-def root_element(file: Path) -> etree._Element:
-    """First element of an XML file, which may be compressed with gzip.
+def source_root(file: Path) -> etree._Element:
+    """First element of the user's XML file, which may be compressed with gzip.
 
     Raises:
-        UserError: The file is missing or no XML.
+        UserError: The file is missing, no XML, or has a document type.
     """
-    if not file.is_file():
-        raise UserError(f"{file}: no such file")
     try:
-        with gzip.open(file) if file.suffix == ".gz" else file.open("rb") as content:
-            _, root = next(etree.iterparse(content, events=("start",)))
-    except (etree.XMLSyntaxError, OSError, EOFError, zlib.error, StopIteration):
-        raise UserError(f"{file}: not XML; a .pbf becomes OSM XML with: osmium cat FILE.osm.pbf -o FILE.osm") from None
-    return root
+        return root_element(file)
+    except UserError as error:
+        if "not XML" not in str(error):
+            raise
+        raise UserError(f"{error}; a .pbf becomes OSM XML with: osmium cat FILE.osm.pbf -o FILE.osm") from None
 
 
 def read_source(path: Path, named: Path) -> sumolib.net.Net:
     """Read a net; `named` is the file that error lines speak of."""
-    root = root_element(path)
+    root = source_root(path)
     if root.tag != "net":
         more = "an extract of OpenStreetMap goes with --from-osm" if root.tag == "osm" else "give a .net.xml"
         raise UserError(f"{named}: its root is <{root.tag}>, not <net>; {more}")

@@ -85,6 +85,7 @@ def test_a_compressed_extract_through_the_command(tmp_path: Path) -> None:
         ("<net/>", "its root is <net>, not <osm>; a SUMO net goes with --from-net"),
         ("\0\0\0\rOSMHeader", "osmium cat"),
         ("", "not XML"),
+        ('<!DOCTYPE osm [<!ENTITY a "b">]><osm version="0.6">&a;</osm>', "it has a document type"),
     ],
 )
 def test_what_is_no_extract_with_a_ramp_is_one_line(tmp_path: Path, text: str, message: str) -> None:
