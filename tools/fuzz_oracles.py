@@ -344,7 +344,9 @@ def condition(rng: random.Random) -> str:
 def where(rows: list[dict[str, Any]], condition: str, taken: list[str]) -> None:
     """Compare the rows for which a condition holds with Python's own reading of it, row by row."""
     try:
-        code = compile(condition.replace("&", " and ").replace("|", " or ").replace("~", " not "), "where", "eval")
+        code = compile(
+            condition.strip().replace("&", " and ").replace("|", " or ").replace("~", " not "), "where", "eval"
+        )
         names = {"__builtins__": {}, "inf": math.inf, "Inf": math.inf}
         holds = [row["case"] + row["method"] for row in rows if eval(code, names, row)]  # a condition that was taken
     except Exception as error:

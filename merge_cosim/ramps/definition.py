@@ -67,7 +67,7 @@ class RampFile(Table):
     ramp: list[str] = Field(min_length=1)
     merging_lane: list[int]
     gore: str
-    merging_point: float = Field(ge=0.0)
+    merging_point: float = Field(ge=0.0, le=1e5)
     speed_limit: SpeedLimit
     lengths: dict[str, PositiveFloat] = Field(default_factory=dict)
     extensions: Extensions = Extensions()

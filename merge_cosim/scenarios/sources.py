@@ -25,6 +25,10 @@ from merge_cosim.simulation.worlds.meetings import Attention
 from merge_cosim.sumo.demand import Demand
 
 
+MOST_CASES = 10_000_000
+"""Most cases of a grid: more is a slip in a step or an end."""
+
+
 class Strict(BaseModel):
     """A part of a scenario file: a misspelt key is refused, and so is a number that is none."""
 
@@ -95,6 +99,13 @@ class Grid(Strict):
     host_speed: Annotated[Span, Speeds]
     merging_speed: Annotated[Span, Speeds]
     length: PositiveFloat = 5.0
+
+    @model_validator(mode="after")
+    def _not_endless(self) -> Self:
+        spans = (self.host_offset, self.host_speed, self.merging_speed)
+        if math.prod((span.last - span.first) / span.step + 1.0 for span in spans) > MOST_CASES:
+            raise ValueError(f"a grid of more than {MOST_CASES:,} cases; take longer steps")
+        return self
 
 
 class Random(Strict):

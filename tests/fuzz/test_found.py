@@ -227,3 +227,12 @@ def test_a_net_that_sumo_cannot_bear(tmp_path: Path, stands: str, written: str, 
     net.write_text(text.replace(stands, written, 1))
     with pytest.raises(UserError, match=rf"designed\.net\.xml: .*{re.escape(fault)}"):
         tile_net(Ramp.load(tmp_path), 2)
+
+
+@pytest.mark.parametrize(
+    ("stands", "written"), [("to = 4, step = 4", "to = 1e20, step = 4"), ("step = 4", "step = 1e-300")]
+)
+def test_a_grid_without_an_end(tmp_path: Path, stands: str, written: str) -> None:
+    (tmp_path / "s.toml").write_text(GRID.replace(stands, written))
+    line = refused("run", "s.toml", "--case", "x", "--method", "acc", cwd=tmp_path)
+    assert "s.toml: encounters: a grid of more than 10,000,000 cases; take longer steps" in line
