@@ -165,16 +165,16 @@ def _work(targets: list[Target], numbers: range, seed: int, scratch: Path, pipe:
 
 
 def fuzz(
-    targets: list[Target], inputs: int, seed: int, keep: Path | None = None, limit: float = LIMIT
+    targets: list[Target], inputs: int, seed: int, keep: Path | None = None, limit: float = LIMIT, first: int = 0
 ) -> Counter[tuple[str, str]]:
-    """Run so many inputs, the targets in turn; returns how many of each target became what."""
+    """Run so many inputs from the first one on, the targets in turn; returns how many of each target became what."""
     counts: Counter[tuple[str, str]] = Counter()
     turns = [target for target in targets for _ in range(target.share)]
     random.Random(0).shuffle(turns)
     place = Path("/dev/shm")
     with tempfile.TemporaryDirectory(dir=place if place.is_dir() else None) as scratch:
         os.environ["MERGE_COSIM_CACHE"] = str(Path(scratch) / "cache")
-        for found in outcomes(turns, range(inputs), seed, Path(scratch), limit):
+        for found in outcomes(turns, range(first, first + inputs), seed, Path(scratch), limit):
             counts[found.target, found.kind] += 1
             if found.kind in GOOD:
                 continue
@@ -188,6 +188,7 @@ def main() -> int:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--inputs", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first input")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="names of targets, with commas between")
     parser.add_argument("--keep", type=Path, help="folder for the inputs that make a fault")
@@ -196,13 +197,18 @@ def main() -> int:
         given.keep.mkdir(parents=True, exist_ok=True)
     targets = [one for one in TARGETS if not given.only or one.name in given.only.split(",")]
     began = time.monotonic()
-    counts = fuzz(targets, given.inputs, given.seed, given.keep)
+    counts = fuzz(targets, given.inputs, given.seed, given.keep, first=given.first)
     kinds: Counter[str] = Counter()
     for (_, kind), count in counts.items():
         kinds[kind] += count
     by_target = {one.name: {kind: counts[one.name, kind] for kind in sorted(kinds)} for one in targets}
     used = sum(os.times()[:4])
-    summary = {"inputs": given.inputs, "seed": given.seed, "wall_s": round(time.monotonic() - began)}
+    summary = {
+        "inputs": given.inputs,
+        "first": given.first,
+        "seed": given.seed,
+        "wall_s": round(time.monotonic() - began),
+    }
     print(json.dumps({**summary, "cpu_s": round(used), **kinds, "targets": by_target}, indent=1))
     return 0 if set(kinds) <= set(GOOD) else 1
 

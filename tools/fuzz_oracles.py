@@ -8,7 +8,6 @@ import math
 import random
 import re
 import tomllib
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from itertools import pairwise
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
+from lxml import etree
 from pydantic import BaseModel
 
 from merge_cosim.api.results import Results
@@ -109,7 +109,7 @@ def _number(text: str) -> float:
 
 def text_rows(content: bytes, names: tuple[str, ...] | None) -> Iterator[dict[str, str]]:
     """The rows of a text; `names` of the columns where it has no header, and then blanks separate them, or commas."""
-    lines = content.decode("utf-8-sig", errors="replace").splitlines()
+    lines = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     comma = "," in lines[0]
     parted = csv.reader(lines) if comma else (line.split() for line in lines)
     parted = (fields for fields in parted if fields)
@@ -182,20 +182,12 @@ def grid(encounters: Encounters, file: Path) -> None:
     same("encounters", len(encounters), count)
 
 
-def xml(file: Path) -> ElementTree.Element:
-    """Root of an XML file in whatever encoding it names."""
-    content = file.read_bytes()
-    named = re.match(rb"""<\?xml[^>]*encoding=["']([^"']+)["'][^>]*\?>""", content)
-    text = content.decode(named[1].decode() if named else "utf-8-sig")
-    return ElementTree.fromstring(re.sub(r"^<\?xml[^>]*\?>", "", text))
-
-
 def ramp(found: Ramp, net: Path, definition: Path) -> None:
     """Compare a ramp with its two files: the edges' lengths, one after the other, from the gore."""
     told = tomllib.loads(definition.read_text())
     same("speed limit", found.speed_limit, told["speed_limit"])
     same("merging point", found.merging_point, told["merging_point"])
-    edges = {edge.get("id"): edge.findall("lane") for edge in xml(net).iter("edge")}
+    edges = {edge.get("id"): edge.findall("lane") for edge in etree.parse(net).getroot().iter("edge")}
     for key, lanes, sections in (("main", "host_lane", found.main), ("ramp", "merging_lane", found.ramp)):
         same(f"edges of {key}", [one.edge for one in sections], told[key])
         same(f"lanes of {key}", [one.lane for one in sections], told[lanes])
@@ -204,7 +196,7 @@ def ramp(found: Ramp, net: Path, definition: Path) -> None:
     same("gore", round(found.main[0].start, 6), -round(sum(float(edges[one][0].get("length")) for one in own), 6))
 
 
-def _lengths(sections: tuple[Section, ...], edges: dict[str | None, list[ElementTree.Element]]) -> None:
+def _lengths(sections: tuple[Section, ...], edges: dict[str | None, list[etree._Element]]) -> None:
     for one in sections:
         own = edges[one.edge]
         length = float(own[0].get("length", "nan"))
@@ -218,7 +210,7 @@ def _lengths(sections: tuple[Section, ...], edges: dict[str | None, list[Element
 
 def routes(encounters: Encounters, file: Path, found: Ramp) -> None:
     """Compare encounters with the route file: the cars with a role, in order, and where they start."""
-    root = xml(file)
+    root = etree.parse(file).getroot()
     types = {kind.get("id"): kind for kind in root.iter("vType")}
     cars: dict[str, list[tuple[str, float, float]]] = {"host": [], "merging": []}
     for vehicle in root.iter("vehicle"):

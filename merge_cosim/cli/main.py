@@ -328,7 +328,7 @@ def refusal(error: Exception) -> str | None:
         return str(error)
     if isinstance(error, OSError):  # a full disk, a folder without permission: wherever it strikes
         return f"{error.filename}: cannot be read or written ({error.strerror})" if error.filename else str(error)
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or "failed to map segment" in str(error):  # of a library that is loaded late
         return "not enough memory; try fewer --jobs, or fewer cases"
     from merge_cosim.core.registry import plugin_error
 

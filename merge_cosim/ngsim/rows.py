@@ -47,7 +47,8 @@ def needed_columns(source: Source, assumed: Site | None) -> list[str]:
         )
     wanted = [*_site_columns(source, assumed), *clock, layout.recording, *layout.numbers.values(), "source", "smoothed"]
     found = list(dict.fromkeys(column for name in wanted if (column := source.find(name))))
-    if twice := [column for column in found if source.columns.count(column) > 1]:
+    spelled = [column.lower() for column in source.columns]
+    if twice := [column for column in found if spelled.count(column.lower()) > 1]:
         raise UserError(f"{source}: two columns are called {twice[0]}; remove one")
     return found
 

@@ -24,7 +24,6 @@ from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.simulation.worlds.meetings import Attention
 from merge_cosim.sumo.demand import Demand
 
-
 MOST_CASES = 10_000_000
 """Most cases of a grid: more is a slip in a step or an end."""
 

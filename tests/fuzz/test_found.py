@@ -48,6 +48,8 @@ def test_columns_of_other_kinds_and_twice(tmp_path: Path) -> None:
     command = ("ngsim", "import", "t.parquet", "--out", "o")
     pq.write_table(table.append_column("Lane_ID", table["Lane_ID"]), tmp_path / "t.parquet")
     assert "t.parquet: two columns are called Lane_ID; remove one" in refused(*command, cwd=tmp_path)
+    pq.write_table(table.append_column("LANE_ID", table["Lane_ID"]), tmp_path / "t.parquet")
+    assert "t.parquet: two columns are called Lane_ID; remove one" in refused(*command, cwd=tmp_path)
     pq.write_table(table.append_column("smoothed", pa.array([[True]] * len(table))), tmp_path / "t.parquet")
     assert "t.parquet: its columns cannot be taken as trajectories" in refused(*command, cwd=tmp_path)
 
