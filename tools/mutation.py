@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
 import shutil
 import sqlite3
@@ -20,15 +21,21 @@ from pathlib import Path
 from merge_cosim.results.statistics.rates import wilson
 
 CORE = {
-    "loop": (["simulation/loop.py", "simulation/leader.py", "simulation/host_driver.py"], ["simulation"]),
-    "scoring": (["scoring/scoring.py", "scoring/rules.py", "scoring/decisions.py"], ["scoring"]),
-    "readers": (
-        ["ngsim/clean.py", "ngsim/formats.py", "ngsim/table.py", "ngsim/rows.py", "ngsim/resample.py"],
-        [f"ngsim/test_{name}.py" for name in ("cells", "formats", "read", "resample", "table")],
+    "scoring": (
+        ["scoring/scoring.py", "scoring/rules.py", "scoring/decisions.py"],
+        ["scoring/test_scoring.py", "scoring/test_measures.py"],
     ),
     "statistics": (
         ["results/statistics/rates.py", "results/statistics/verdict.py", "results/statistics/summary.py"],
         [f"results/test_{name}.py" for name in ("statistics", "summaries", "verdict")],
+    ),
+    "readers": (
+        ["ngsim/clean.py", "ngsim/formats.py", "ngsim/table.py", "ngsim/rows.py", "ngsim/resample.py"],
+        [f"ngsim/test_{name}.py" for name in ("cells", "formats", "read", "resample", "table")],
+    ),
+    "loop": (
+        ["simulation/loop.py", "simulation/leader.py", "simulation/host_driver.py"],
+        [f"simulation/test_{name}.py" for name in ("loop", "leader", "host_driver")],
     ),
 }
 """Modules of each part, and the tests that must kill their mutants."""
@@ -50,8 +57,8 @@ def score(part: str, sample: int, seed: int, copy: Path) -> dict[str, object]:
     places = json.dumps([f"merge_cosim/{module}" for module in modules])
     files = " ".join(f"tests/{test}" for test in tests)
     config.write_text(CONFIG.format(modules=places, tests=files, python=sys.executable))
-    run = [sys.executable, "-m", "cosmic_ray.cli"]
-    subprocess.run([*run, "init", str(config), str(session)], cwd=copy, check=True)
+    run, own = [sys.executable, "-m", "cosmic_ray.cli"], os.environ | {"PYTHONPATH": str(copy)}
+    subprocess.run([*run, "init", str(config), str(session)], cwd=copy, env=own, check=True)
     with sqlite3.connect(session) as base:
         every = base.execute("select job_id, module_path, operator_name, start_pos_row from mutation_specs").fetchall()
         meant = sorted(one for one in every if _meant(copy / one[1], one[3]))
@@ -61,7 +68,7 @@ def score(part: str, sample: int, seed: int, copy: Path) -> dict[str, object]:
             base.executemany(
                 f"delete from {table} where job_id = ?", [(one[0],) for one in every if one[0] not in kept]
             )
-    subprocess.run([*run, "exec", str(config), str(session)], cwd=copy, check=True)
+    subprocess.run([*run, "exec", str(config), str(session)], cwd=copy, env=own, check=True)
     with sqlite3.connect(session) as base:
         rows = base.execute(
             "select m.module_path, m.start_pos_row, m.operator_name, r.test_outcome from mutation_specs m "

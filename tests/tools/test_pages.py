@@ -1,5 +1,6 @@
 """Every tool that makes a page of the docs runs in its short mode and writes a whole page, with its pictures."""
 
+import json
 import re
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import models_page
 import pandas as pd
 import ranking_page
 import robustness_page
+import robustness_runs_page
 import scenes_page
 import sensitivity_page
 import surrogate_page
@@ -73,6 +75,27 @@ def test_robustness(tmp_path, monkeypatch):
     robustness_page.main(["--short", "--docs", str(tmp_path)])
     assert made_like(tmp_path, "sensors.md").count("| `sensing.") == 13
     assert made_like(tmp_path, "tests.md").count("%, ") >= 2 * 10
+
+
+def test_robustness_runs(tmp_path):
+    ends = {"same": 2, "wrong": 1}
+    part = {"mutants": 90, "run": 4, "killed": 3, "survived": ["merge_cosim/a.py:3 core/AddNot"]}
+    files = {
+        "fuzz": {"inputs": 7, "seed": 5, "right": 4, "refused": 3, "targets": {"net": {"right": 4, "refused": 3}}},
+        "faults": {"faults": 3, "seed": 5, **ends, "kinds": {"kill": ends}},
+        "mutation": {"seed": 5, "run": 4, "killed": 3, "interval_pct": [30.1, 95.4], "parts": {"loop": part}},
+    }
+    words = ["--docs", str(tmp_path)]
+    for name, found in files.items():
+        (tmp_path / name).write_text(json.dumps(found))
+        words += [f"--{name}", str(tmp_path / name)]
+    robustness_runs_page.main(words)
+    text = made_like(tmp_path, "robustness.md")
+    assert "python tools/fuzz.py --inputs 7 --seed 5 >" in text
+    assert "| net | 4 | 3 | 0 |" in text
+    assert "| `kill` | 2 | 1 |" in text
+    assert "Killed: 3 of 4, 75.0 % (95 %: 30.1 to 95.4 %)." in text
+    assert "- `a.py:3 core/AddNot`" in text
 
 
 def test_headroom(tmp_path):
