@@ -65,6 +65,9 @@ def convert(files: Sequence[Path], out: Path, wanted: Site | None = None) -> Con
     elsewhere = everything.elsewhere + Counter(
         {name: table.num_rows for name, table in everything.tables.items() if name not in tables}
     )
+    for name in tables:
+        if Path(name).name != name:
+            raise UserError(f"{files[0]}: site '{name}': no name for a file; rename it, or choose one by --site")
     written = {name: out / f"{name}-trajectories.parquet" for name in tables}
     if overwritten := {path.resolve() for path in written.values()} & {path.resolve() for path in files}:
         raise UserError(f"{overwritten.pop()}: would be overwritten: choose another --out")

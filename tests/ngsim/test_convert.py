@@ -1,5 +1,7 @@
 import json
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from command import merge_cosim, refused
 from ngsim_files import car, write_csv, write_portal
@@ -43,6 +45,16 @@ def test_a_file_is_not_overwritten_by_itself(portal, tmp_path):
     done = convert([portal], tmp_path / "out")
     with pytest.raises(UserError, match="would be overwritten"):
         convert([done.written["us101"]], tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", ["a/b", "../b"])
+def test_a_site_that_is_no_name_for_a_file(portal, tmp_path, name):
+    table = pq.read_table(convert([portal], tmp_path / "out").written["us101"])
+    column = pa.array([name] * len(table)).dictionary_encode()
+    pq.write_table(table.set_column(0, table.schema.field("site"), column), tmp_path / "own.parquet")
+    with pytest.raises(UserError, match="no name for a file"):
+        convert([tmp_path / "own.parquet"], tmp_path / "new")
+    assert not (tmp_path / "new").exists()
 
 
 def test_rows_of_other_sites_as_json_and_the_summary_of_what_was_written(portal, tmp_path):
