@@ -93,7 +93,7 @@ def parse_variation(text: str) -> tuple[str, list[Any]]:
         whole = all(part == round(part) for part in (first, step))
     except (ValueError, ZeroDivisionError, OverflowError):
         count = -1
-    if not 0 <= count < MOST_VALUES:
+    if not 0 <= count < MOST_VALUES or last < first:
         raise UserError(
             f"--vary {text}: write NAME=A:B:STEP with A <= B and fewer steps than {MOST_VALUES:,}, or X,Y,Z"
         )

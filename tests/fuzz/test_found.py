@@ -97,9 +97,10 @@ def test_a_site_with_what_is_no_number(tmp_path: Path, stands: str, written: str
         read_site(tmp_path)
 
 
-def test_a_variation_in_infinite_steps() -> None:
-    with pytest.raises(UserError, match="write NAME=A:B:STEP"):
-        parse_variation("acc.headway=1:2:inf")
+@pytest.mark.parametrize("written", ["1:2:inf", "1:0:1e20", "x:0:1"])
+def test_a_variation_without_an_end_or_backwards(written: str) -> None:
+    with pytest.raises(UserError, match="write NAME=A:B:STEP with A <= B"):
+        parse_variation(f"acc.headway={written}")
 
 
 @pytest.mark.parametrize(
