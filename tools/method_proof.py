@@ -125,8 +125,8 @@ def choice(case: str) -> str:
     driver.start(1, Setting())
     driver.reset(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(1, np.uint64))
     text = ""
-    for k, row in enumerate(run.traces.itertuples()):
-        cars = row.host_station_m, row.host_speed, row.merging_station_m, row.merging_speed, 5.0, 5.0
+    for k, row in enumerate(run.trace.itertuples()):
+        cars = row.host_station_m, row.host_speed_m_s, row.merging_station_m, row.merging_speed_m_s, 5.0, 5.0
         seen = Observation(*(np.array([value]) for value in cars))
         if seen.merging_in_lane[0]:
             break

@@ -100,7 +100,7 @@ class Rollout(ReactingDriver, Acc):
     step: PositiveFloat = 0.25
     goal: PositiveFloat = 50.0
     scored: PositiveFloat = 3.0
-    overlap: NonNegativeFloat = 20.0
+    overlap: NonNegativeFloat = 10.0
     spread: PositiveFloat = 0.5
     spread_rate: NonNegativeFloat = 0.5
     progress: NonNegativeFloat = 1.0
@@ -110,7 +110,7 @@ class Rollout(ReactingDriver, Acc):
     commitment: NonNegativeFloat = 0.2
     max_jerk: PositiveFloat = 3.0
     escape: bool = True
-    tolerated_risk: Share = 0.3
+    tolerated_risk: Share = 0.02
     escape_braking: NonNegativeFloat = 4.0
     escape_acceleration: Acceleration = 3.0
     follower_braking: PositiveFloat = 3.0
@@ -176,7 +176,7 @@ class Rollout(ReactingDriver, Acc):
         )
         self._kinds = np.array([kind for _, kind, _ in _POLICIES])
         self._held = np.array([held for _, _, held in _POLICIES])
-        self._margins = np.full((count, len(DRIVER_TYPES)), self.driver_margin)
+        self._traits = np.tile([self.driver_margin, self.driver_margin, 0.0, 0.0, 0.0, 0.0], (count, 1))
         self._delays = np.zeros(count)
         self._last = np.full(count, np.nan)
         self.last_policy = np.full(count, -1)
@@ -200,14 +200,14 @@ class Rollout(ReactingDriver, Acc):
         state = np.stack([getattr(seen, name) for name in STATE])
         self._plans = plans = ~seen.merging_in_lane
         self.last_belief = self._belief(seen, log_odds)
-        margins, delays = self._margins, self._delays
+        traits, delays = self._traits, self._delays
         if self._filter is not None:
-            margins, delays = self._filter.margins, self._filter.unreacted * self._filter.reaction_time
+            traits, delays = self._filter.traits, self._filter.unreacted * self._filter.reaction_time
         choose(
             state,
             plans,
             self.last_belief,
-            margins,
+            traits,
             delays,
             self._kinds,
             self._held,
@@ -243,4 +243,5 @@ class Rollout(ReactingDriver, Acc):
         not_yield = (0.5 + 0.5 * np.tanh(0.5 * log_odds)) * (1.0 - self.ignore_share)
         yields = 1.0 - self.ignore_share - not_yield
         waits = np.where(seen.merging_speed < self.standing, yields, 0.0)
-        return np.stack([yields - waits, not_yield, np.full_like(yields, self.ignore_share), waits], axis=1)
+        none = np.zeros_like(yields)
+        return np.stack([yields - waits, not_yield, none + self.ignore_share, waits, none, none], axis=1)

@@ -13,7 +13,7 @@ from merge_cosim.core.units import Acceleration, Braking
 if TYPE_CHECKING:
     from merge_cosim.estimators.compiled.drivers import DriverLaw
 
-DRIVER_TYPES = ("yield", "not_yield", "ignore", "wait")
+DRIVER_TYPES = ("yield", "not_yield", "ignore", "wait", "accelerate", "late")
 """The types, in the order of every array of beliefs."""
 
 
@@ -24,8 +24,10 @@ class ReactingDriver:
     `need(T) = 2 (d - v T) / T^2` covers the way d to the merging point in the time T; where that would stop the car
     before the point, it is the stop at the point, `-v^2 / (2 d)`. `yield`: `min(need(T_h + m), 0)`. `not_yield`:
     `max(need(T_h - m), 0)`. `ignore`: 0, throughout. `wait`: goes once it arrives `critical_gap` before the host, and
-    else stops at the merging point. Once either car has reached the merging point, all but `ignore` keep distance
-    behind a host ahead, and drive freely without one.
+    else stops at the merging point. `accelerate`: a steady acceleration up to the speed limit. `late`: 0, and from some
+    way before the merging point as hard as it can. These two look at the host only once they are in the lane, the
+    others but `ignore` once either car has reached the merging point; then they keep distance behind a host ahead, and
+    drive freely without one. Above the speed limit every type slows down.
 
     Attributes:
         driver_margin: Margin m between the two arrivals [s].

@@ -8,22 +8,24 @@ from merge_cosim.core.units import time_to_arrival
 
 TOL = 1e-6
 SUDDEN = "brake 4", "accelerate 2"
-YIELD, NOT_YIELD, IGNORE, WAIT = range(4)
+YIELD, NOT_YIELD, IGNORE, WAIT, ACCELERATE, LATE = range(6)
 
 
 def needed(way, speed, time):
     return np.where(speed * time > 2 * way, -(speed**2) / (2 * way), 2 * (way - speed * time) / time**2)
 
 
-def driver(kind, margin, host, host_speed, length, station, speed, p, limit, dt=0.1):
+def driver(kind, trait, host, host_speed, length, station, speed, p, limit, dt=0.1):
     """Acceleration of a driver of type `kind` in every encounter."""
     arrival, way = time_to_arrival(host, host_speed), np.maximum(-station, 0.1)
-    if kind == IGNORE:
-        return np.zeros_like(station)
-    if kind == YIELD:
-        plan = np.minimum(needed(way, speed, np.maximum(arrival + margin, dt)), 0)
+    if kind in (IGNORE, ACCELERATE):
+        plan = trait * (kind == ACCELERATE) + np.zeros_like(station)
+    elif kind == LATE:
+        plan = np.where(way <= trait, p.driver_max_acceleration, 0.0)
+    elif kind == YIELD:
+        plan = np.minimum(needed(way, speed, np.maximum(arrival + trait, dt)), 0)
     elif kind == NOT_YIELD:
-        plan = np.maximum(needed(way, speed, np.maximum(arrival - margin, dt)), 0)
+        plan = np.maximum(needed(way, speed, np.maximum(arrival - trait, dt)), 0)
     else:
         stop = -(speed**2) / (2 * way)
         stop = np.where(stop <= -p.waiting_braking, stop, 0.0)
@@ -37,7 +39,9 @@ def driver(kind, margin, host, host_speed, length, station, speed, p, limit, dt=
     if kind == WAIT:
         beside = (station < -TOL) & (lead > -TOL) & (lead < length + p.driver_d0)
         after = np.where(beside, -(speed**2) / (2 * way), after)
-    wanted = np.where(np.maximum(host, station) >= -TOL, after, plan)
+    looks = {IGNORE: np.full_like(station, -np.inf), ACCELERATE: station, LATE: station}
+    wanted = np.where(looks.get(kind, np.maximum(host, station)) >= -TOL, after, plan)
+    wanted = np.where(free < 0, np.minimum(wanted, free), wanted)
     return np.clip(wanted, p.driver_min_acceleration, p.driver_max_acceleration)
 
 
@@ -59,7 +63,7 @@ def wanted(policy, host, host_speed, station, speed, length, p, limit):
     return np.clip(np.where(station >= -TOL, merged, plan), p.min_acceleration, p.max_acceleration)
 
 
-def cost(policy, kind, margin, delay, seen: Observation, last, p: Rollout, limit):
+def cost(policy, kind, trait, delay, seen: Observation, last, p: Rollout, limit):
     """Cost and probability of an overlap, shape (n,) each."""
     host, host_speed, length_h = seen.host_station.copy(), seen.host_speed.copy(), seen.host_length
     station, speed, length_m = seen.merging_station.copy(), seen.merging_speed.copy(), seen.merging_length
@@ -74,7 +78,7 @@ def cost(policy, kind, margin, delay, seen: Observation, last, p: Rollout, limit
             change = p.max_jerk * p.step
             bounded = np.minimum(np.maximum(a, acceleration - change), acceleration + change)
             a = np.where(np.isnan(acceleration), a, bounded)
-        b = driver(kind, margin, host, host_speed, length_h, station, speed, p, limit)
+        b = driver(kind, trait, host, host_speed, length_h, station, speed, p, limit)
         b = np.where(now >= delay, b, 0.0)
         faster = np.maximum(host_speed + a * p.step, 0)
         quicker = np.minimum(np.maximum(speed + b * p.step, 0), np.maximum(limit, speed))
@@ -104,11 +108,11 @@ def cost(policy, kind, margin, delay, seen: Observation, last, p: Rollout, limit
     return sudden + p.progress * reached + p.effort * effort + p.overlap * probability, probability
 
 
-def costs(seen, margins, delays, last, planner, limit):
+def costs(seen, traits, delays, last, planner, limit):
     """All costs, shape (n, policies, types)."""
     return np.stack(
         [
-            np.stack([cost(q, k, margins[:, k], delays, seen, last, planner, limit)[0] for k in range(4)], axis=-1)
+            np.stack([cost(q, k, traits[:, k], delays, seen, last, planner, limit)[0] for k in range(6)], axis=-1)
             for q in POLICIES
         ],
         axis=1,

@@ -39,11 +39,11 @@ def test_costs_are_those_of_numpy():
     seen = states(n)
     made = planner(n, least_belief=0.0, escape=False)
     log_odds = np.linspace(-3, 3, n)
-    margins = np.full((n, 4), made.driver_margin)
+    traits = made._traits = np.tile([1.2, 1.2, 0.0, 0.0, 0.8, 35.0], (n, 1))
     for last in (np.full(n, np.nan), made.command(seen, log_odds, log_odds >= 0)):
         made._last = last.copy()
         made.command(seen, log_odds, log_odds >= 0)
-        expected = costs(seen, margins, np.zeros(n), last, made, LIMIT)
+        expected = costs(seen, traits, np.zeros(n), last, made, LIMIT)
         np.testing.assert_allclose(made.last_costs, expected, rtol=1e-9, atol=1e-9)
 
 
@@ -117,7 +117,7 @@ def test_beliefs_are_the_filters_and_of_others_the_stated_shares():
     other = HostDriver(AccMerging(), Rollout(ignore_share=0.2))
     other.start(1, Setting(LIMIT))
     other.decide(seen)
-    np.testing.assert_allclose(other.controller.last_belief, [[0.0, 0.8, 0.2, 0.0]])
+    np.testing.assert_allclose(other.controller.last_belief, [[0.0, 0.8, 0.2, 0.0, 0.0, 0.0]])
 
 
 def test_after_the_merge_the_law_of_acc_drives():
@@ -186,7 +186,7 @@ def test_an_escape_avoids_the_overlap_whatever_the_driver_does(s_h, v_h, s_m, v_
     for k in range(100):
         a = driven[k % 30]
         if s_h >= -0.1:
-            passed += 0.1
+            passed += 0.1 * (s_m >= 0)
             if s_m < s_h and passed > 0.3 and v_m > 0:
                 a = -3.0
         v_h, v_m = min(max(v_h + then * 0.1, 0.0), LIMIT), min(max(v_m + a * 0.1, 0.0), LIMIT)

@@ -10,8 +10,8 @@ from merge_cosim.estimators.compiled.drivers import TOL
 
 SHORT = 0.1
 """Way before the merging point [m] within which the host counts as having reached it."""
-NONE, LEFT, FORCED = 0, 1, 2
-"""No escape exists; the wanted acceleration leaves one; the acceleration was changed to leave one."""
+UNSEEN, NONE, LEFT, FORCED = -1, 0, 1, 2
+"""Not looked at; no escape exists; the wanted acceleration leaves one; the acceleration was changed to leave one."""
 
 
 class Bounds(NamedTuple):
@@ -44,8 +44,8 @@ def escapes(
 
     Until the host's front reaches the merging point the driver may do anything within its bounds, so its stations lie
     between that of full braking and that of full acceleration. If all of them are then upstream of the merging point,
-    the driver follows: after a reaction time it brakes at least with `follower_braking`. If all are a length ahead, it
-    may brake as hard as it can.
+    the driver comes behind: it may accelerate until it is in the lane, and a reaction time later brakes at least with
+    `follower_braking`. If all are a length ahead, it may brake as hard as it can.
     """
     dt = bounds.dt
     top = max(bounds.speed_limit, speed)
@@ -76,8 +76,8 @@ def escapes(
                 order = 2
             else:
                 return False
-        since += dt
         if order == 1:
+            since += dt if fast_station >= -TOL else 0.0
             if fast_station >= -TOL and host_station - host_length < fast_station - TOL:
                 return False
             if since >= bounds.follower_reaction and fast_speed <= host_speed and then >= 0.0:
@@ -122,9 +122,10 @@ def constrain(
         levels: Number of steps between the wanted acceleration and the escape's that are tried.
         bounds: What the host can do and the merging driver may do.
         wanted: Accelerations [m/s^2], to be changed, shape (n,).
-        status: To be filled: `NONE`, `LEFT` or `FORCED`, shape (n,).
+        status: To be filled: `UNSEEN`, `NONE`, `LEFT` or `FORCED`, shape (n,).
     """
     for row in range(state.shape[1]):
+        status[row] = UNSEEN
         if not guarded[row]:
             continue
         h, v, s, u, length_h, length_m = state[:, row]

@@ -80,7 +80,7 @@ def rollout(
     policy: int,
     held: float,
     kind: int,
-    margin: float,
+    trait: float,
     delay: float,
     host_station: float,
     host_speed: float,
@@ -98,7 +98,7 @@ def rollout(
     surest = 1e9
     effort = 0.0
     acceleration = last
-    unmoved = reacting(kind, margin, host_station, host_speed, host_length, station, speed, law)
+    unmoved = reacting(kind, trait, host_station, host_speed, host_length, station, speed, law)
     reached = -1.0
     both = -1
     time = 0.0
@@ -112,7 +112,7 @@ def rollout(
         if time >= delay and not host.reacts:
             driver = unmoved if station < -TOL else 0.0
         elif time >= delay:
-            driver = reacting(kind, margin, host_station, host_speed, host_length, station, speed, law)
+            driver = reacting(kind, trait, host_station, host_speed, host_length, station, speed, law)
         before = host_speed
         host_speed = max(host_speed + acceleration * host.step, 0.0)
         speed = min(max(speed + driver * host.step, 0.0), max(limit, speed))
@@ -157,7 +157,7 @@ def choose(
     state: FloatArray,
     plans: BoolArray,
     belief: FloatArray,
-    margins: FloatArray,
+    traits: FloatArray,
     delays: FloatArray,
     kinds: IntArray,
     held: FloatArray,
@@ -177,7 +177,7 @@ def choose(
         state: The rows of an `Observation`, shape (6, n).
         plans: Encounters whose merging car is not yet in the lane, shape (n,).
         belief: Belief in each type of driver, shape (n, types); types with less than `least` are left out, at cost 0.
-        margins: The driver's margin under each type [s], shape (n, types).
+        traits: The driver's trait under each type, see `planned`, shape (n, types).
         delays: Time before the driver acts [s], shape (n,).
         kinds: What each policy is, shape (policies,).
         held: The acceleration of those that hold one [m/s^2], shape (policies,).
@@ -205,7 +205,7 @@ def choose(
                         kinds[policy],
                         held[policy],
                         kind,
-                        margins[row, kind],
+                        traits[row, kind],
                         delays[row],
                         h,
                         v,

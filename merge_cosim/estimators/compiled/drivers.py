@@ -10,7 +10,7 @@ from numba import njit
 TOL = 1e-6
 NEAR = 0.1
 """Way [m] below which an acceleration is no longer computed from the way left."""
-YIELD, NOT_YIELD, IGNORE, WAIT = 0, 1, 2, 3
+YIELD, NOT_YIELD, IGNORE, WAIT, ACCELERATE, LATE = 0, 1, 2, 3, 4, 5
 
 
 class DriverLaw(NamedTuple):
@@ -44,15 +44,23 @@ def needed(way: float, speed: float, time: float) -> float:
 
 
 @njit(cache=True)
-def planned(kind: int, margin: float, host_arrival: float, station: float, speed: float, law: DriverLaw) -> float:
-    """Acceleration [m/s^2] that a driver of a type plans before either car has reached the merging point."""
+def planned(kind: int, trait: float, host_arrival: float, station: float, speed: float, law: DriverLaw) -> float:
+    """Acceleration [m/s^2] that a driver of a type plans before either car has reached the merging point.
+
+    The trait is the margin [s] of `YIELD` and `NOT_YIELD`, the acceleration [m/s^2] of `ACCELERATE`, the way to the
+    merging point [m] at which `LATE` begins.
+    """
     way = max(-station, NEAR)
     if kind == YIELD:
-        wanted = min(needed(way, speed, max(host_arrival + margin, law.dt)), 0.0)
+        wanted = min(needed(way, speed, max(host_arrival + trait, law.dt)), 0.0)
     elif kind == NOT_YIELD:
-        wanted = max(needed(way, speed, max(host_arrival - margin, law.dt)), 0.0)
+        wanted = max(needed(way, speed, max(host_arrival - trait, law.dt)), 0.0)
     elif kind == IGNORE:
         wanted = 0.0
+    elif kind == ACCELERATE:
+        wanted = trait
+    elif kind == LATE:
+        wanted = law.max_acceleration if way <= trait else 0.0
     elif host_arrival - arrival(station, speed) >= law.critical_gap:
         wanted = law.k_free * (law.speed_limit - speed)
     else:
@@ -64,7 +72,7 @@ def planned(kind: int, margin: float, host_arrival: float, station: float, speed
 @njit(cache=True)
 def reacting(
     kind: int,
-    margin: float,
+    trait: float,
     host_station: float,
     host_speed: float,
     host_length: float,
@@ -74,17 +82,23 @@ def reacting(
 ) -> float:
     """Acceleration [m/s^2] of a driver of a type: its plan, and once a car has passed, distance keeping.
 
-    A driver that ignores the host holds the speed throughout; one that waits lets the host's rear pass.
+    A driver that ignores the host holds the speed throughout; one that waits lets the host's rear pass; those that
+    accelerate look once they are in the lane. Who is faster than the speed limit slows down, whatever the type.
     """
+    free = law.k_free * (law.speed_limit - speed)
+    blind = kind in (ACCELERATE, LATE)
     if kind == IGNORE:
-        return 0.0
-    if max(host_station, station) < -TOL:
-        return planned(kind, margin, arrival(host_station, host_speed), station, speed, law)
-    wanted = law.k_free * (law.speed_limit - speed)
-    lead = host_station - station
-    if kind == WAIT and station < -TOL and -TOL < lead < host_length + law.d0:
-        return max(-speed * speed / (2.0 * max(-station, NEAR)), law.min_acceleration)
-    if lead > TOL:
-        gap = lead - host_length - law.d0 - law.headway * speed
-        wanted = min(wanted, law.k_gap * gap + law.k_speed * (host_speed - speed))
+        wanted = 0.0
+    elif (station if blind else max(host_station, station)) < -TOL:
+        wanted = planned(kind, trait, arrival(host_station, host_speed), station, speed, law)
+    else:
+        wanted = free
+        lead = host_station - station
+        if kind == WAIT and station < -TOL and -TOL < lead < host_length + law.d0:
+            wanted = -speed * speed / (2.0 * max(-station, NEAR))
+        elif lead > TOL:
+            gap = lead - host_length - law.d0 - law.headway * speed
+            wanted = min(wanted, law.k_gap * gap + law.k_speed * (host_speed - speed))
+    if free < 0.0:
+        wanted = min(wanted, free)
     return min(max(wanted, law.min_acceleration), law.max_acceleration)
