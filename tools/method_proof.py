@@ -1,9 +1,9 @@
-"""Bring the page of `interactive` up to date: python tools/method_proof.py [--data DIR] [--only NAME ...].
+"""Bring the page of `interactive` up to date: python tools/method_proof.py [--data DIR] [--only ...] [--again ...].
 
 The blocks `<!-- proof: NAME -->` ... `<!-- end -->` of docs/methods/interactive.md are tables of sweeps, each with the
 command that gives the same figures. `<!-- choice: CASE -->` shows why policies were chosen in a case of Designed Test
 III.
-Without --data, tables of logged cars stay as they are.
+Without --data, tables of logged cars stay as they are; with --again only the rows of these methods are made anew.
 """
 
 import shlex
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from blocks import fill_page, page_parser, table
+from blocks import BLOCK, DOCS, fill_page, page_parser, table
 
 import merge_cosim as mc
 from merge_cosim.controllers.rollout import POLICIES, Rollout
@@ -25,7 +25,15 @@ from merge_cosim.simulation.host_driver import HostDriver
 
 RIVALS = ["interactive", "acc", "slot", "slot-time", "pgm", "fg-gmm", "dbn-pf", "ipcb"]
 NARROW = {"speed_limit": 12, "encounters.length": 7}
+GRID = "host_offset", "host_speed", "merging_speed"
 SEED = "encounters.seed", "merging.seed"
+SHORT = {
+    "designed-2": {f"encounters.{name}.step": step for name, step in zip(GRID, (10, 12, 12), strict=True)},
+    "designed-3": {"encounters.count": 20},
+    "shifted": {"encounters.count": 20},
+}
+OTHERS = ["acc", "slot", "slot-time", "pgm", "ipcb"]
+PAGE = "methods/interactive.md"
 
 
 @dataclass(frozen=True)
@@ -67,7 +75,8 @@ STUDIES = {
     "designed-1": Study(["designed-1"], RIVALS, logged=True),
     "hidden": Study(["designed-3"], [*RIVALS, "oracle-label", "always-go", "always-yield", "oracle-best"]),
     "seeds": Study(["designed-3"], ["interactive"], [dict.fromkeys(SEED, seed) for seed in range(5, 10)]),
-    "shifted": Study(["shifted"], ["interactive", "acc", "slot", "slot-time", "pgm", "ipcb"]),
+    "shifted": Study(["shifted"], ["interactive", *OTHERS]),
+    "shifted-seeds": Study(["shifted"], ["interactive", "slot-time", "ipcb"], [{"encounters.seed": 5}]),
     "replay": Study(["us101-replay"], [*RIVALS, "human"], logged=True),
     "planners": Study(["designed-3"], ["interactive", *PLANNERS, "oracle-label+rollout"]),
     "ablations": Study(["designed-3"], ["interactive"], ABLATIONS),
@@ -79,18 +88,27 @@ def shown(settings: dict[str, Any]) -> str:
     return ", ".join(f"`{key}={value}`" for key, value in settings.items())
 
 
-def proof(name: str, short: bool, data: Path | None) -> str | None:
-    """The table of one study."""
+def stays(name: str, head: Sequence[str], again: Sequence[str]) -> list[list[str]]:
+    """Rows of a table on the page, of methods that are not made anew."""
+    text = (DOCS / PAGE).read_text(encoding="utf-8")
+    block = next(one[0] for one in BLOCK.finditer(text) if (one["kind"], one["argument"]) == ("proof", name))
+    rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in block.splitlines() if line.startswith("|")]
+    return [row for row in rows[2:] if row[head.index("method")] not in again]
+
+
+def proof(name: str, short: bool, data: Path | None, again: Sequence[str] = ()) -> str | None:
+    """The table of one study; with `again` only the rows of these methods are new."""
     study = STUDIES[name]
     if study.logged and data is None:
         return None
+    methods = [method for method in study.methods if not again or method in again]
     head = ["scenario", "method", "settings", "n", "failed", "stuck", "failed or stuck [%]", "delay [s]", "D [m]"]
     head += ["hardest braking [m/s²]", "jerk [m/s³]"]
     rows = []
     for settings in study.settings:
-        given = settings | ({"encounters.count": 20} if short and "designed-3" in study.scenarios else {})
+        given = settings | (SHORT.get(study.scenarios[0], {}) if short else {})
         found = mc.sweep(
-            study.scenarios, study.methods, settings=given, data=data, world="closed-form", progress=False
+            study.scenarios, methods, settings=given, data=data, world="closed-form", progress=False
         ).summary()
         for row in found.sort_values("scenario", kind="stable").itertuples():
             interval = f"{row.failed_or_stuck_pct:.2f}"
@@ -113,6 +131,8 @@ def proof(name: str, short: bool, data: Path | None) -> str | None:
             )
     if not any(row[2] for row in rows):
         head, rows = head[:2] + head[3:], [row[:2] + row[3:] for row in rows]
+    if again:
+        rows = sorted(rows + stays(name, head, again), key=lambda row: row[: len(head) - 8])
     return f"`{study.command(study.settings[0])}`\n\n{table(head, rows, left=len(head) - 8)}"
 
 
@@ -159,14 +179,15 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, help="folder with real NGSIM files")
     parser.add_argument("--only", nargs="*", choices=[*STUDIES, "choice"], help="blocks to fill; all, if not given")
+    parser.add_argument("--again", nargs="*", default=[], help="methods whose rows are made anew; all, if not given")
     given = parser.parse_args(argv)
     wanted = given.only or [*STUDIES, "choice"]
 
     def proof_or_stay(name: str) -> str | None:
-        return proof(name, given.short, given.data) if name in wanted else None
+        return proof(name, given.short, given.data, given.again) if name in wanted else None
 
     kinds = {"proof": proof_or_stay, "choice": lambda case: choice(case) if "choice" in wanted else None}
-    fill_page("methods/interactive.md", given.docs, kinds)
+    fill_page(PAGE, given.docs, kinds)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import geometry_page
 import headroom_page
 import kept_aside_page
 import method_pages
+import method_proof
 import models_page
 import pandas as pd
 import ranking_page
@@ -101,6 +102,14 @@ def test_robustness_runs(tmp_path):
 def test_headroom(tmp_path):
     headroom_page.main(["--short", "--docs", str(tmp_path)])
     assert "40 cases. The clairvoyant host fails in 0 and" in made_like(tmp_path, "tests.md")
+
+
+def test_method_proof(tmp_path):
+    method_proof.main(["--short", "--docs", str(tmp_path), "--only", "designed", "choice", "--again", "interactive"])
+    text = made_like(tmp_path, "methods/interactive.md")
+    assert re.search(r"^\| designed-2 \| interactive \| 18 \|", text, flags=re.MULTILINE)
+    assert re.search(r"^\| designed-2 \| ipcb \| 6875 \|", text, flags=re.MULTILINE)  # a row that stays
+    assert text.count("driven: **") >= 3
 
 
 def test_traffic(tmp_path):
