@@ -91,8 +91,10 @@ def shown(settings: dict[str, Any]) -> str:
 def stays(name: str, head: Sequence[str], again: Sequence[str]) -> list[list[str]]:
     """Rows of a table on the page, of methods that are not made anew."""
     text = (DOCS / PAGE).read_text(encoding="utf-8")
-    block = next(one[0] for one in BLOCK.finditer(text) if (one["kind"], one["argument"]) == ("proof", name))
-    rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in block.splitlines() if line.startswith("|")]
+    block = next(
+        one[0] for one in BLOCK.finditer(text) if (one["kind"], one["argument"]) == ("proof", name)
+    ).splitlines()
+    rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in block if line[:1] == "|"]
     return [row for row in rows[2:] if row[head.index("method")] not in again]
 
 
