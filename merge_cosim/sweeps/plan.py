@@ -322,6 +322,10 @@ def _all_on_the_ramp(scenario: Scenario, states: RandomStates) -> bool:
 
 def _on_the_ramp(scenario: Scenario, encounters: Encounters) -> tuple[Encounters, tuple[str, ...]]:
     """The encounters that the ramp has room for, and the names of the others."""
+    if not len(encounters):
+        raise UserError(
+            f"scenario {scenario.name}: no encounter is left to run; lower encounters.fraction, if it is set"
+        )
     ramp = Ramp.load(scenario.ramp)
     paths = {scenario.host: encounters.host_station, scenario.other: encounters.merging_station}
     fits = ramp.holds(encounters.merge_position, paths["main"], paths["ramp"])

@@ -31,7 +31,8 @@ def rows(task: Task, session: WorkerSession, size: int | None = None) -> pd.Data
 
 
 @pytest.mark.parametrize(
-    ("scenario", "request_"), [("designed-2", {}), ("designed-3", {}), ("us101-replay", {"source": "surrogate"})]
+    ("scenario", "request_"),
+    [("designed-2", {}), ("designed-3", {}), ("us101-replay", {"source": "surrogate", "model": "us101-ngsim"})],
 )
 def test_the_closed_form_ends_as_sumo_does(scenario, request_):
     session = WorkerSession()

@@ -15,7 +15,8 @@ from merge_cosim.sweeps.worker_session import WorkerSession
 def tasks(scenario: str, host: str, methods: tuple[str, ...], cases: int = 60, world="sumo", **settings) -> list[Task]:
     """An evenly spaced part of a scenario."""
     values = {"host": host} | {name.replace("__", "."): value for name, value in settings.items()}
-    found = plan(SweepRequest([scenario], methods, settings=values, world=world, source="surrogate"))
+    how = {"settings": values, "world": world, "source": "surrogate", "model": "us101-ngsim"}
+    found = plan(SweepRequest([scenario], methods, **how))
     return [task.take(np.unique(np.linspace(0, len(task) - 1, cases).astype(int))) for task in found]
 
 
