@@ -99,6 +99,7 @@ class Struck:
             sys.stdout, sys.stderr = (os.fdopen(descriptor, "w") for descriptor in (1, 2))
             sys.argv = ["merge-cosim", *SWEEP, "--start", "fork", "--out", str(self.out), "--resume"]
             self.before()
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
             merge_cosim_main()
         except SystemExit as end:
@@ -188,7 +189,7 @@ def limit_files(sweep: Struck) -> bool:
 
 def limit_memory(sweep: Struck) -> bool:
     """By a limit of memory."""
-    more = sweep.rng.randint(1, 60) << 20
+    more = sweep.rng.randint(0, 8) << 20
     sweep.before = lambda: resource.setrlimit(resource.RLIMIT_AS, (psutil.Process().memory_info().vms + more,) * 2)
     return _end(sweep, sweep.begin()) != 0
 

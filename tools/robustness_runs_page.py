@@ -7,36 +7,58 @@ python tools/robustness_runs_page.py --fuzz fuzz.json --faults faults.json --mut
 """
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from blocks import fill_page, page_parser, table
+from faults import FAULTS
+from mutation import CORE
 
 KINDS = ("right", "refused", "wrong", "traceback", "line", "hang", "crash", "process")
 
 
-def fuzz(found: dict[str, Any]) -> str:
-    """The command, and what became of each target's inputs."""
-    first = f" --first {found['first']}" if found.get("first") else ""
-    command = f"python tools/fuzz.py --inputs {found['inputs']} --seed {found['seed']}{first} > fuzz.json"
-    rows = [[name, *(f"{ends.get(kind, 0):,}" for kind in KINDS)] for name, ends in found["targets"].items()]
-    rows.append(["**all**", *(f"**{found.get(kind, 0):,}**" for kind in KINDS)])
-    return f"```\n{command}\n```\n\n{table(['target', *KINDS], rows)}"
+def fuzz(runs: Sequence[dict[str, Any]]) -> str:
+    """The commands, and what became of each target's inputs in all of them."""
+    commands = [
+        f"python tools/fuzz.py --seed {run['seed']} --first {run.get('first', 0)} --inputs {run['inputs']}"
+        for run in runs
+    ]
+    counts = {name: Counter[str]() for run in runs for name in run["targets"]}
+    for run in runs:
+        for name, ends in run["targets"].items():
+            counts[name].update(ends)
+    found = [(name, ends) for name, ends in counts.items() if ends.total()]
+    rows = [[name, *(f"{ends[kind]:,}" for kind in KINDS)] for name, ends in found]
+    whole = sum(counts.values(), Counter[str]())
+    rows.append(["**all**", *(f"**{whole[kind]:,}**" for kind in KINDS)])
+    text = f"{whole.total():,} inputs."
+    return "```\n" + "\n".join(commands) + f"\n```\n\n{text}\n\n{table(['target', *KINDS], rows)}"
 
 
-def faults(found: dict[str, Any]) -> str:
-    """The command, and how the sweeps ended, by kind of fault."""
-    command = f"python tools/faults.py --faults {found['faults']} --seed {found['seed']} > faults.json"
-    rows = [[f"`{name}`", str(ends["same"]), str(ends["wrong"])] for name, ends in found["kinds"].items()]
-    rows.append(["**all**", f"**{found['same']}**", f"**{found['wrong']}**"])
-    return f"```\n{command}\n```\n\n{table(['fault', 'the same bytes', 'anything else'], rows)}"
+def faults(runs: Sequence[dict[str, Any]]) -> str:
+    """The commands, and how the sweeps ended, by kind of fault."""
+    commands = [f"python tools/faults.py --faults {run['faults']} --seed {run['seed']}{_only(run)}" for run in runs]
+    ends = {name: Counter[str]() for run in runs for name in run["kinds"]}
+    for run in runs:
+        for name, found in run["kinds"].items():
+            ends[name].update(found)
+    whole = sum(ends.values(), Counter[str]())
+    rows = [[f"`{name}`", str(found["same"]), str(found["wrong"])] for name, found in ends.items()]
+    rows.append(["**all**", f"**{whole['same']}**", f"**{whole['wrong']}**"])
+    return "```\n" + "\n".join(commands) + f"\n```\n\n{table(['fault', 'the same bytes', 'anything else'], rows)}"
+
+
+def _only(run: dict[str, Any]) -> str:
+    return f" --only {','.join(run['kinds'])}" if set(run["kinds"]) < {kind.__name__ for kind in FAULTS} else ""
 
 
 def mutation(found: dict[str, Any]) -> str:
     """The command, the score of each part, and what survived."""
     most = max(part["run"] for part in found["parts"].values())
-    command = f"python tools/mutation.py --sample {most} --seed {found['seed']} > mutation.json"
+    only = f" --only {','.join(found['parts'])}" if len(found["parts"]) < len(CORE) else ""
+    command = f"python tools/mutation.py --sample {most} --seed {found['seed']}{only} > mutation.json"
     rows = [[name, *(str(part[key]) for key in ("mutants", "run", "killed"))] for name, part in found["parts"].items()]
     low, high = found["interval_pct"]
     share = 100.0 * found["killed"] / found["run"]
@@ -50,12 +72,17 @@ def mutation(found: dict[str, Any]) -> str:
 def main(argv: Sequence[str] | None = None) -> None:
     """Fill the blocks of which the output is given."""
     parser = page_parser(__doc__)
-    parts = {"fuzz": fuzz, "faults": faults, "mutation": mutation}
-    for name in parts:
-        parser.add_argument(f"--{name}", type=Path, help="what the command has printed")
+    parser.add_argument("--fuzz", type=Path, nargs="+", help="what the commands have printed")
+    parser.add_argument("--again", type=Path, nargs="+", help="the same, of inputs that were faults before")
+    parser.add_argument("--faults", type=Path, nargs="+", help="what the commands have printed")
+    parser.add_argument("--mutation", type=Path, help="what the command has printed")
     given = parser.parse_args(argv)
-    files = {name: getattr(given, name) for name in parts}
-    made = {name: parts[name](json.loads(file.read_text())) for name, file in files.items() if file}
+    made = {}
+    for name, shown in (("fuzz", fuzz), ("again", fuzz), ("faults", faults)):
+        if files := getattr(given, name):
+            made[name] = shown([json.loads(file.read_text()) for file in files])
+    if given.mutation:
+        made["mutation"] = mutation(json.loads(given.mutation.read_text()))
     fill_page("robustness.md", given.docs, {"runs": made.get})
 
 

@@ -8,6 +8,7 @@ import shutil
 import weakref
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -300,15 +301,18 @@ class Results:
 
 
 def _constant_part(condition: str) -> bool:
-    """Whether `not` stands before something without a column in it, which pandas takes for a number's bits."""
+    """Whether something without a column in it is negated or compared, which pandas takes for a number's bits."""
     try:
         parts = list(ast.walk(ast.parse(condition.strip(), mode="eval")))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False  # pandas tells
-    negated = (
-        one.operand for one in parts if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.Not | ast.Invert)
-    )
-    return not all(any(isinstance(part, ast.Name) for part in ast.walk(one)) for one in negated)
+    pieces: list[list[ast.expr]] = []
+    for one in parts:
+        if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.Not | ast.Invert):
+            pieces.append([one.operand])
+        elif isinstance(one, ast.Compare):
+            pieces += map(list, pairwise([one.left, *one.comparators]))
+    return not all(any(isinstance(part, ast.Name) for one in piece for part in ast.walk(one)) for piece in pieces)
 
 
 def load_results(folder: str | Path) -> Results:

@@ -9,12 +9,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from command import merge_cosim, refused
-from fuzz_inputs import CONFIG, GRID, PLUGIN, ROUTES, trajectories, trajectory_table
+from fuzz_inputs import CONFIG, GRID, PLUGIN, ROUTES, episode_table, trajectories, trajectory_table
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
 from merge_cosim.estimators.learned.model import MODELS, IntentionModel
-from merge_cosim.ngsim.sites import read_site
+from merge_cosim.ngsim.pairing.episodes import episode_tracks
+from merge_cosim.ngsim.sites import read_site, site
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import netedit_view
 from merge_cosim.results.store import ResultFolder
@@ -60,6 +61,11 @@ def test_a_column_whose_name_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "t.parquet").write_bytes(content.replace(b"Lane_ID", b"Lane\xffID"))
     line = refused("ngsim", "import", "t.parquet", "--out", "o", cwd=tmp_path)
     assert "t.parquet: damaged or cut short" in line
+    pq.write_table(episode_table(), tmp_path / "e.parquet", store_schema=False)
+    content = (tmp_path / "e.parquet").read_bytes()
+    (tmp_path / "e.parquet").write_bytes(content.replace(b"speed_m_s", b"speed\xffm_s"))
+    with pytest.raises(UserError, match=r"e\.parquet: not a readable Parquet file"):
+        episode_tracks(tmp_path / "e.parquet", site("us101"), site("us101").pairs)
 
 
 def test_a_net_whose_path_has_no_connection(tmp_path: Path) -> None:
@@ -191,8 +197,10 @@ def test_a_condition_with_a_part_of_constants(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(GRID)
     words = ("--method", "acc", "--world", "closed-form", "--jobs", 1, "--out", "out")
     assert merge_cosim("sweep", "s.toml", *words, cwd=tmp_path).returncode == 0
-    line = refused("cases", "out", "--where", "stuck | (not -1 != 'x')", cwd=tmp_path)
-    assert "a part of it names no column; write one such as" in line
+    for condition in ("stuck | (not -1 != 'x')", "method == 'acc' == 'acc'"):
+        line = refused("cases", "out", "--where", condition, cwd=tmp_path)
+        assert "a part of it names no column; write one such as" in line
+    assert merge_cosim("cases", "out", "--where", "0 <= delay_s < 5", cwd=tmp_path).returncode == 0
 
 
 def test_a_net_without_a_junction(tmp_path: Path) -> None:

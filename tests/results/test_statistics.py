@@ -14,7 +14,7 @@ from merge_cosim.results.statistics import belief, calibration, strata, summaris
 from merge_cosim.results.statistics.belief import scores
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.results.statistics.paired import mean_difference, sign_flip_p
-from merge_cosim.results.statistics.rates import bootstrap_means, wilson
+from merge_cosim.results.statistics.rates import bootstrap_means, percent, wilson
 
 
 def test_wilson_against_its_formula():
@@ -211,3 +211,7 @@ def test_cars_with_several_cases_get_a_clustered_interval():
     half = [one | {"failed": i % 2 == 0, "censored": i % 2 == 1} for i, one in enumerate(rows)]
     assert summarise(frame(*half), {}).iloc[0]["cluster_low_pct"] == 100.0  # what is censored does not count
     assert single["distance_low_m"] == single["distance_high_m"] == 10.0
+
+
+def test_a_share_in_percent_has_four_decimals():
+    assert (percent(1, 3), percent(2, 3), percent(1, 0)) == (33.3333, 66.6667, None)

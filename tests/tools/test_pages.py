@@ -92,7 +92,7 @@ def test_robustness_runs(tmp_path):
         words += [f"--{name}", str(tmp_path / name)]
     robustness_runs_page.main(words)
     text = made_like(tmp_path, "robustness.md")
-    assert "python tools/fuzz.py --inputs 7 --seed 5 >" in text
+    assert "python tools/fuzz.py --seed 5 --first 0 --inputs 7\n" in text
     assert "| net | 4 | 3 | 0 |" in text
     assert "| `kill` | 2 | 1 |" in text
     assert "Killed: 3 of 4, 75.0 % (95 %: 30.1 to 95.4 %)." in text

@@ -82,11 +82,12 @@ def _columns(path: Path) -> dict[str, FloatArray]:
     """Read and check the columns, as floats."""
     try:
         table = pq.read_table(path)
-    except (OSError, pa.ArrowInvalid) as error:
+        names = table.column_names
+    except (OSError, pa.ArrowInvalid, UnicodeDecodeError) as error:  # a column's name may be no text
         raise UserError(f"{path}: not a readable Parquet file; get it again") from error
     columns: dict[str, FloatArray] = {}
     for name in COLUMNS:
-        if name not in table.column_names:
+        if name not in names:
             raise UserError(f"{path}: no column {name!r}; merging episodes have {', '.join(COLUMNS)}")
         try:
             columns[name] = table[name].cast(pa.float64()).to_numpy()
