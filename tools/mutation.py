@@ -101,7 +101,7 @@ def main() -> None:
             found[part] = score(part, given.sample, given.seed, copy)
             print(json.dumps({part: found[part]}), file=sys.stderr, flush=True)
     killed, run = (sum(int(str(one[name])) for one in found.values()) for name in ("killed", "run"))
-    interval = [round(100.0 * float(end), 1) for end in wilson(killed, run)]
+    interval = [round(float(end), 1) for end in wilson(killed, run)]
     print(
         json.dumps(
             {"seed": given.seed, "run": run, "killed": killed, "interval_pct": interval, "parts": found}, indent=1
