@@ -257,7 +257,7 @@ SLIPS = (
         (("sweep", "small.toml", "--method", "acc", "--against", "slto"), "--against slto: no such method"),
         (("sweep", "small.toml", "--method", "human"), "nothing to run"),
         (("sweep", "designed-3", "--set", "encounters.cuont=5"), "did you mean 'count'"),
-        (("bounds", "designed-2"), "bounds are against a log"),
+        (("bounds", "traffic-light"), "bounds are for two cars alone"),
         (("run", "small.toml", "--case", "d+0_h5_m5", "--method", "acc", "--trace", "x.txt"), "x.txt"),
     ],
 )
