@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import sumolib
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.files import cache_folder, from_cache
+from merge_cosim.core.files import cache_folder
 from merge_cosim.ramps.build import PLAIN, built, config
 from merge_cosim.ramps.definition import FILE_NAME, RampFile, read_ramp_file
 from merge_cosim.ramps.paths import MAX_TURN, turn
@@ -60,7 +59,7 @@ def check(folder: Path) -> list[str]:
 
 
 def refuse_unsound(folder: Path) -> None:
-    """Refuse a ramp that does not pass `check`, whose outcome is kept in the cache for as long as its files stay.
+    """Refuse a ramp that does not pass `check`; that one passes is kept in the cache for as long as its files stay.
 
     Raises:
         UserError: It does not pass; the line names the first problem.
@@ -70,15 +69,15 @@ def refuse_unsound(folder: Path) -> None:
     held = hashlib.sha256()
     for file in filter(Path.is_file, (*named, *sorted(plain), *sorted(folder.glob("*.netccfg")))):
         held.update(f"{file.name} {hashlib.sha256(file.read_bytes()).hexdigest()}\n".encode())
-    place = cache_folder("checks") / f"{held.hexdigest()[:16]}.json"
-    from_cache(place, lambda made: made.write_text(json.dumps([str(folder), check(folder)]), encoding="utf-8"))
-    then, problems = json.loads(place.read_text(encoding="utf-8"))
-    if problems:
+    sound = cache_folder("checks") / held.hexdigest()[:16]
+    if sound.is_file():
+        return
+    if problems := check(folder):
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
         raise UserError(
-            f"{problems[0].replace(then, str(folder))}{more}: see merge-cosim ramp check {folder}; "
-            "--unchecked-ramp runs it all the same"
+            f"{problems[0]}{more}: see merge-cosim ramp check {folder}; --unchecked-ramp runs it all the same"
         )
+    sound.touch()
 
 
 def _of_encounters(net: sumolib.net.Net, file: RampFile, ramp: Ramp) -> list[str]:

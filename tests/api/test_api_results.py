@@ -8,6 +8,9 @@ from lxml import html
 from matplotlib.figure import Figure
 
 import merge_cosim as mc
+from merge_cosim.report.notebook import tables_html
+from merge_cosim.report.short_table import short_tables
+from merge_cosim.report.text_table import as_text
 
 
 def test_rows_and_what_was_run(results):
@@ -29,6 +32,9 @@ def test_it_shows_itself_as_a_table(results):
 def test_a_notebook_gets_the_table_and_the_interactive_charts(results):
     bundle = results._repr_mimebundle_()
     assert bundle["text/plain"] == repr(results)
+    tables = short_tables(results.path)
+    assert repr(results).endswith(as_text(tables))
+    assert bundle["text/html"].startswith(tables_html(tables))
     shown = html.fromstring(bundle["text/html"])
     assert [row.xpath("td")[0].text_content() for row in shown.xpath("//tbody/tr")] == ["acc", "pgm"]
     page = html.fromstring(shown.xpath("//iframe/@srcdoc")[0])

@@ -142,7 +142,7 @@ def test_a_file_that_sumo_misses_is_one_line(tmp_path: Path) -> None:
 def test_teleports_and_contacts_of_others_are_told_and_counted(tmp_path: Path, removed: str) -> None:
     trouble = """
 <vehicle id="block" type="car" depart="0" departPos="300" departSpeed="0"><route edges="ramp weave main_out"/>
-<stop lane="ramp_0" endPos="310" duration="1000"/></vehicle>
+<stop lane="ramp_0" endPos="310" duration="12"/></vehicle>
 <vehicle id="jam" type="car" depart="0" departPos="290" departSpeed="0"><route edges="ramp weave main_out"/></vehicle>
 <vehicle id="o1" type="car" depart="0" route="main" departLane="3" departPos="200" insertionChecks="none"/>
 <vehicle id="o2" type="car" depart="0" route="main" departLane="3" departPos="203" insertionChecks="none"/>

@@ -75,7 +75,9 @@ def test_a_net_whose_path_has_no_connection(tmp_path: Path) -> None:
     net.write_text("\n".join(kept))
     (tmp_path / "my.rou.xml").write_text(ROUTES)
     (tmp_path / "my.sumocfg").write_text(CONFIG)
-    line = refused("run", "my.sumocfg", "--case", "h0_m0", "--method", "acc", cwd=tmp_path)
+    words = ("run", "my.sumocfg", "--case", "h0_m0", "--method", "acc")
+    assert "merging_lane: no connection in the net from ramp_0 to main_out_0" in refused(*words, cwd=tmp_path)
+    line = refused(*words, "--unchecked-ramp", cwd=tmp_path)
     assert "SUMO cannot drive the ramp's paths: Vehicle 't0.merging' has no valid route" in line
 
 
