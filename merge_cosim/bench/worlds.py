@@ -14,7 +14,7 @@ from merge_cosim.sweeps.task import Task
 from merge_cosim.sweeps.worker_session import WorkerSession
 
 SCENARIO = "designed-2"
-METHODS = ("acc", "slot", "pgm", "fg", "ipcb", "dbn-pf")
+METHODS = ("acc", "slot", "pgm", "fg", "ipcb", "dbn-pf", "interactive")
 WORLDS: tuple[WorldKind, ...] = ("sumo", "closed-form")
 
 
