@@ -52,6 +52,21 @@ class Rules:
         return now.merging_in_lane
 
 
+def end_of(states: Observation, rules: Rules) -> int:
+    """The cycle in which an encounter was over that was recorded beyond that, by the rules of `Watch`.
+
+    Args:
+        states: Its states from the first on, shape (N,) each.
+        rules: When it is scored.
+    """
+    begun = rules.begun(states)
+    begun[0] = False
+    start = int(begun.argmax()) if begun.any() else NEVER
+    failed = np.flatnonzero(states.gap[start:] < -TOLERANCE)
+    first = start + int(failed[0]) if len(failed) else NEVER
+    return min(start + rules.horizon_cycles, first, len(begun) - 1, rules.time_out_cycles)
+
+
 def expected_cycles(encounters: Encounters, rules: Rules) -> FloatArray:
     """Rough length of each case: both cars accelerate to the merging point, then it is scored; shape (n,)."""
     arrivals = [

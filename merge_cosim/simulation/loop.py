@@ -14,7 +14,7 @@ from merge_cosim.core.observation import Setting
 from merge_cosim.core.units import AnyArray, BoolArray, FloatArray, IntArray
 from merge_cosim.merging_cars.base import MergingCar
 from merge_cosim.scoring.invariants import Bounds, broken
-from merge_cosim.scoring.rules import Rules, Watch
+from merge_cosim.scoring.rules import Rules, Watch, end_of
 from merge_cosim.scoring.scoring import score
 from merge_cosim.scoring.tracks import Tracks
 from merge_cosim.simulation.host_driver import DriverBlocks, HostDriver
@@ -269,9 +269,11 @@ class Loop:
             name = str(ended.names[number])
             if case < 0 and name not in self._traced:
                 continue
-            track = self._recorder.track(slot, int(self._age[slot]))[:, : end + 1]
-            if ended.points is not None:
-                track = self._world.settled(track, float(ended.points[number]))
+            track = self._recorder.track(slot, int(self._age[slot]))
+            if ended.points is not None:  # counted from there, it may have been over earlier or later
+                track = self._world.settled(track[:, : int(valid[number]) + 1], float(ended.points[number]))
+                end = end_of(self._recorder.states(track, slot), self._rules)
+            track = track[:, : end + 1]
             if case >= 0:
                 self._over[case] = track[: len(track) - len(self._told)]
             if name in self._traced:

@@ -81,6 +81,12 @@ class Recorder:
             return self._cycles[first:now, :, slot].T.copy()
         return np.concatenate([self._cycles[first:, :, slot].T, self._cycles[:now, :, slot].T], axis=1)
 
+    def states(self, track: FloatArray, slot: int) -> Observation:
+        """The states of a slot's track, shape (cycles + 1,) each."""
+        lengths = np.repeat(self.lengths[:, [slot]], track.shape[1], axis=1)
+        rows = (HOST_STATION, HOST_SPEED, MERGING_STATION, MERGING_SPEED)
+        return Observation(*(track[row] for row in rows), *lengths)
+
     def from_the_start(self, slots: slice, cycles: IntArray) -> FloatArray:
         """Records of some slots end to end, in each of which one encounter began in the very first cycle, (rows, N).
 

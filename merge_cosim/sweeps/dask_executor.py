@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -68,7 +68,7 @@ class Cluster:
         for name in ("distributed", "distributed.client"):  # lost connections are told by us, in one line
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
-    def run(self, queue: ChunkQueue) -> Iterator[Finished]:
+    def run(self, queue: ChunkQueue) -> Generator[Finished]:
         """See `Executor`."""
         worker_files_of: dict[str, WorkerFiles] = {}
         session = uuid4().hex[:8]

@@ -8,7 +8,7 @@ import signal
 import threading
 import traceback
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
@@ -43,7 +43,7 @@ class Finished(NamedTuple):
 class Executor(Protocol):
     """Runs chunks somewhere."""
 
-    def run(self, queue: ChunkQueue) -> Iterator[Finished]:
+    def run(self, queue: ChunkQueue) -> Generator[Finished]:
         """Run all chunks of `queue` and yield each as soon as it is done, in any order.
 
         Raises:
@@ -64,7 +64,7 @@ def executor_for(request: SweepRequest, chunks: int) -> Executor:
 class InProcess:
     """Runs the chunks in this process, one after the other."""
 
-    def run(self, queue: ChunkQueue) -> Iterator[Finished]:
+    def run(self, queue: ChunkQueue) -> Generator[Finished]:
         """See `Executor`."""
         worker_session = WorkerSession()
         try:
@@ -93,7 +93,7 @@ class Processes:
         self._plugins = tuple(plugins)
         self._context = multiprocessing.get_context(start)
 
-    def run(self, queue: ChunkQueue) -> Iterator[Finished]:
+    def run(self, queue: ChunkQueue) -> Generator[Finished]:
         """See `Executor`."""
         losses: Counter[str] = Counter()
         workers: dict[Connection, _Worker] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
@@ -189,13 +190,14 @@ def _run(request: SweepRequest, chunks: Sequence[Chunk], folder: ResultFolder, p
     total = sum(map(len, chunks))
     finished = sum(len(chunk) for chunk in chunks if chunk.name in done)
     tally = _Tally()
-    for chunk, rows, effort in executor_for(request, len(queue)).run(queue):
-        folder.add(chunk.name, rows)
-        queue.finished(chunk, effort)
-        tally.add(chunk.whole.method.name, effort)
-        finished += len(chunk)
-        if progress:
-            progress(finished, total, f"{chunk.whole.scenario.name} {chunk.whole.method.name}")
+    with closing(executor_for(request, len(queue)).run(queue)) as outcomes:
+        for chunk, rows, effort in outcomes:
+            folder.add(chunk.name, rows)
+            queue.finished(chunk, effort)
+            tally.add(chunk.whole.method.name, effort)
+            finished += len(chunk)
+            if progress:
+                progress(finished, total, f"{chunk.whole.scenario.name} {chunk.whole.method.name}")
     return tally
 
 

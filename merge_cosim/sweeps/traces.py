@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from typing import Literal, TypeAlias
 
@@ -68,12 +69,13 @@ def record(
     if told:
         told(0, total, f"{total:,} runs to record: about {duration(cost)}")
     queue = ChunkQueue(cut(again))
-    for chunk, records, effort in executor_for(how, len(queue)).run(queue):
-        queue.finished(chunk, effort)
-        folder.add_records(chunk.name, records)
-        done += len(chunk)
-        if told:
-            told(done, total, f"recording {chunk.whole.scenario.name} {chunk.whole.method.name}")
+    with closing(executor_for(how, len(queue)).run(queue)) as outcomes:
+        for chunk, records, effort in outcomes:
+            queue.finished(chunk, effort)
+            folder.add_records(chunk.name, records)
+            done += len(chunk)
+            if told:
+                told(done, total, f"recording {chunk.whole.scenario.name} {chunk.whole.method.name}")
     folder.write_traces()
 
 
