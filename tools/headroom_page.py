@@ -51,7 +51,7 @@ def block(data: Path | None, short: bool, docs: Path, scenario: str) -> str | No
     words = (
         f"{len(cases):,} cases. The clairvoyant host fails in {int(found.isna().sum())} and has a mean delay of "
         f"{found.mean():.2f} s. In {len(searched):,} cases a path was searched, in the others full throttle is the "
-        f"soonest. The smallest delay lies below that of the path by {gap.mean():.2f} s at most in the mean "
+        f"fastest. The smallest delay lies below that of the path by {gap.mean():.2f} s at most in the mean "
         f"({gap.quantile(0.9):.2f} s in nine cases of ten, {gap.max():.2f} s in any)."
     )
     lines = [line(method, part) for method, part in sorted(rows.groupby("method"), key=lambda item: order(item[0]))]

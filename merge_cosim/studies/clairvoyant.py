@@ -2,7 +2,7 @@
 
 The drivers react, so every path is driven against the model of the merging car itself, cycle by cycle, with the case's
 own script and noise. A plan holds one acceleration of `Search.levels` for `Search.hold` cycles. From one hold to the
-next each case keeps `Search.beam` states: those that could still arrive soonest, and a spread of all others. What is
+next each case keeps `Search.beam` states: those that could still arrive first, and a spread of all others. What is
 found can be driven, so its delay is never too small; how far it may be too large is known from full throttle, sooner
 than which no host can be.
 """
@@ -70,7 +70,7 @@ class Plans:
 def search_plans(
     encounters: Encounters, merging_car: MergingCar, rules: Rules, setting: Setting, search: Search, wanted: IntArray
 ) -> Plans:
-    """Search the plan of each case that arrives soonest without a failure.
+    """Search the plan of each case that arrives earliest without a failure.
 
     Args:
         encounters: The n cases.
@@ -194,7 +194,7 @@ def _searched(
         arrival[better] = np.take_along_axis(paths.cost, best, 1)[better, 0]
         found[better, : hold + 1] = np.take_along_axis(history, best[..., None], 1)[better, 0]
         bound = np.minimum(
-            paths.goal, (hold + 1) * search.hold * DT + _soonest(paths.state[0], paths.state[2], setting, levels[-1])
+            paths.goal, (hold + 1) * search.hold * DT + _earliest(paths.state[0], paths.state[2], setting, levels[-1])
         )
         bound[~paths.open | (bound >= arrival[:, None])] = np.inf
         chosen = _chosen(bound, paths, search.beam)
@@ -239,7 +239,7 @@ def _drive(
     paths.open &= ~(fails | ends)
 
 
-def _soonest(station: FloatArray, speed: FloatArray, setting: Setting, acceleration: float) -> FloatArray:
+def _earliest(station: FloatArray, speed: FloatArray, setting: Setting, acceleration: float) -> FloatArray:
     """Time [s] to `GOAL` by full throttle up to the limit, no more than a hundredth too small; 0 if past it."""
     way, half = np.maximum(GOAL - station, 0.0), 0.5 * acceleration * setting.dt
     start, limit = speed + half, np.maximum(speed, setting.speed_limit)  # the speed of a cycle is that of its end

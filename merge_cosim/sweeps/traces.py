@@ -38,8 +38,9 @@ def parse_traces(text: str | int | None) -> Traces:
     Raises:
         UserError: It is none of that.
     """
-    if text in ("all", "failed", "telling", None):
-        return text  # type: ignore[return-value]
+    match text:
+        case "all" | "failed" | "telling" | None:
+            return text
     if str(text).isdecimal() and int(str(text)) > 0:
         return int(str(text))
     raise UserError(f"--traces {text}: give all, failed, telling, or a number of cases")

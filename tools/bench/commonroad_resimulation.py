@@ -2,7 +2,7 @@
 
 Needs `pip install commonroad-sumo eclipse-sumo` in an environment of its own: commonroad-sumo and the commonroad-io
 that merge-cosim exports with cannot share one. SUMO replays both cars, and commonroad-sumo takes each step's states
-over into its scenario; nobody plans or scores, which is less work than ours. Building the network and starting SUMO is
+over into its scenario; nothing plans or scores, which is less work than ours. Building the network and starting SUMO is
 not counted.
 """
 
