@@ -21,7 +21,7 @@ def test_nets_and_scenarios_are_found_from_a_wheel(tmp_path):
         shutil.copytree(ROOT / source, site / target)
 
     def listed(*words: str) -> list[dict[str, str]]:
-        command = [sys.executable, "-m", "merge_cosim.cli.main", *words, "--json"]
+        command = [sys.executable, "-m", "merge_cosim", *words, "--json"]
         done = subprocess.run(
             command,
             cwd=elsewhere,

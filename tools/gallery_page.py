@@ -31,7 +31,7 @@ def run_commands(text: str, folder: Path, short: bool) -> None:
             if "--gui" in words:
                 continue
             fewer = SHORT.get(words[1], ()) if short and words[0] == "sweep" else ()
-            command = [sys.executable, "-m", "merge_cosim.cli.main", *words, *(w for s in fewer for w in ("--set", s))]
+            command = [sys.executable, "-m", "merge_cosim", *words, *(w for s in fewer for w in ("--set", s))]
             subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 

@@ -1,12 +1,12 @@
 """Write the tables of docs/traffic.md: what each method does in living traffic.
 
-    python tools/traffic_page.py [--from DIR]
+    python tools/traffic_page.py [--from DIR ...]
 
 runs one `merge-cosim sweep` of the three traffic scenarios (about a quarter of an hour on two cores) and sets its
-summary, and its table of the traffic as a whole, into the page's block.
+summary, and its table of the traffic as a whole, into the page's block. With `--from` it takes result folders of the
+same scenes under different methods instead.
 """
 
-import json
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ from merge_cosim.report.methods import in_order
 from merge_cosim.results.statistics.rates import wilson
 
 SCENARIOS = ("traffic-light", "traffic-dense", "traffic-stop-and-go")
-METHODS = ("acc", "slot", "slot-time", "pgm", "pgm-time", "fg-time", "ipcb", "ipcb+acc", "dbn-pf")
+METHODS = ("acc", "slot", "slot-time", "pgm", "pgm-time", "fg-time", "ipcb", "ipcb+acc", "dbn-pf", "interactive")
 BOUNDS = ("always-go", "always-yield")
 SHORT = ("encounters.replications=1", "encounters.demand.duration=100", "encounters.demand.warm_up=20")
 """Settings of the short mode: one scene of 100 s."""
@@ -27,9 +27,7 @@ SHORT = ("encounters.replications=1", "encounters.demand.duration=100", "encount
 
 def command(out: str, short: bool = False) -> list[str]:
     """The sweep; in short mode two methods on one scene of each scenario."""
-    methods = [
-        word for method in (("slot", BOUNDS[0]) if short else (*METHODS, *BOUNDS)) for word in ("--method", method)
-    ]
+    methods = ["--method", ",".join(("slot", BOUNDS[0]) if short else (*METHODS, *BOUNDS))]
     settings = [word for setting in SHORT if short for word in ("--set", setting)]
     jobs = ["--jobs", "1"] if short else []
     return ["merge-cosim", "sweep", *SCENARIOS, *methods, *settings, *jobs, "--out", out]
@@ -38,21 +36,17 @@ def command(out: str, short: bool = False) -> list[str]:
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the sweep, if need be, and write the tables."""
     parser = page_parser(__doc__)
-    parser.add_argument("--from", dest="folder", type=Path, help="result folder of the sweep, if it was run already")
+    parser.add_argument("--from", dest="folders", nargs="+", type=Path, help="result folders, if run already")
     given = parser.parse_args(argv)
-    folder = given.folder
-    if folder is None:
-        folder = Path(tempfile.mkdtemp(prefix="traffic-")) / "out"
-        app(command(str(folder), given.short)[1:], standalone_mode=False)
-    summary = pd.read_json(folder / "summary.json")
-    traffic = pd.read_csv(folder / "traffic.csv")
-    manifest = json.loads((folder / "manifest.json").read_text())
+    folders = given.folders
+    if folders is None:
+        folders = [Path(tempfile.mkdtemp(prefix="traffic-")) / "out"]
+        app(command(str(folders[0]), given.short)[1:], standalone_mode=False)
+    summary = pd.concat([pd.read_json(folder / "summary.json") for folder in folders])
+    traffic = pd.concat([pd.read_csv(folder / "traffic.csv") for folder in folders])
     shown = " ".join(command("OUT")).replace(" --method", " \\\n    --method", 1).replace(" --out", " \\\n    --out")
     parts = ["```", shown, "```", ""]
-    parts.append(
-        f"{int(traffic['scenes'].sum())} scenes, {manifest['real_time_factor']:.0f} times real time in each of "
-        f"{manifest['command']['jobs']} processes."
-    )
+    parts.append(f"{int(traffic['scenes'].sum())} scenes.")
     parts += ["", "### All three together", "", together(summary, traffic)]
     for scenario in SCENARIOS:
         own = [rows[rows["scenario"] == scenario] for rows in (summary, traffic)]

@@ -31,7 +31,7 @@ merging_speed = { from = 5, to = 25, step = 5 }
 model = "designed"
 """
 
-COMMAND = (sys.executable, "-m", "merge_cosim.cli.main")
+COMMAND = (sys.executable, "-m", "merge_cosim")
 
 
 def merge_cosim(*arguments: object, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -213,7 +213,7 @@ def test_contacts_are_reported(tmp_path, data_dir):
 
 @pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="needs xvfb-run")
 def test_a_window_writes_the_same(tmp_path):
-    case = [sys.executable, "-m", "merge_cosim.cli.main", "run", "designed-2", "--case", "d+1_h15_m14"]
+    case = [sys.executable, "-m", "merge_cosim", "run", "designed-2", "--case", "d+1_h15_m14"]
     case += ["--method", "acc", "--fcd"]
     with_window = ["xvfb-run", "-a", *case, "gui.xml", "--gui", "--delay", "5", "--quit-on-end"]
     for command in ([*case, "plain.xml"], with_window):

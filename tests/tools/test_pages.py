@@ -115,7 +115,7 @@ def test_method_proof(tmp_path):
 def test_traffic(tmp_path):
     traffic_page.main(["--short", "--docs", str(tmp_path)])
     text = made_like(tmp_path, "traffic.md")
-    assert "6 scenes," in text
+    assert "6 scenes." in text
     assert len(re.findall(r"^\| slot \|", text, flags=re.MULTILINE)) >= 4
 
 
