@@ -27,7 +27,27 @@ def shown(folder: Path, short: bool, argument: str) -> str | None:
         ["–" if pd.isna(v) else f"{v:.2f}" if isinstance(v, float) else str(v) for v in values]
         for values in rows.itertuples(index=False)
     ]
-    return table([str(name).replace("_", " ") for name in rows], cells, left=len(rows.columns))
+    return table([heading(str(name)) for name in rows], cells, left=1 if columns else len(rows.columns))
+
+
+WORDS = {
+    "us101-replay": "US-101",
+    "i80-replay": "I-80",
+    "host_not_reached": "never arrives",
+    "failed_or_stuck_pct": "failed or stuck %",
+    "failure_pct": "failed %",
+    "failures": "failed",
+    "interval_pct": "95 %",
+    "published": "published %",
+    "_": " ",
+}
+
+
+def heading(column: str) -> str:
+    """The heading of a column of these tables."""
+    for name, words in WORDS.items():
+        column = column.replace(name, words)
+    return column
 
 
 def main(argv: Sequence[str] | None = None) -> None:
