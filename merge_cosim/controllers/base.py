@@ -53,7 +53,7 @@ class Controller(Component):
         return np.zeros((0, 0))
 
 
-controllers: Registry[Controller] = Registry("controller", "merge_cosim.controllers")
+controllers: Registry[Controller] = Registry("controller", "merge_cosim.controllers", Controller)
 
 C = TypeVar("C", bound=Controller)
 

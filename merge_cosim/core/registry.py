@@ -64,29 +64,37 @@ def _as_dataclass(cls: type[C]) -> type[C]:
 
 
 class Registry(Generic[C]):
-    """The components of one role, by name.
+    """The components of one role, all of them subclasses of `base`, by name.
 
     All modules of `package` are searched on first use, then the entry points of the group `merge_cosim.<role>`.
     """
 
-    def __init__(self, role: str, package: str) -> None:
+    def __init__(self, role: str, package: str, base: type) -> None:
         self.role = role
+        self.base = base
         self._package = package
         self._classes: dict[str, type[C]] = {}
         self._searched = False
 
     def register(self, cls: type[C]) -> type[C]:
         """Class decorator: enter `cls` under its `name`; see `prepare`."""
-        self._classes[cls.name] = self.prepare(cls)
+        prepared = self.prepare(cls)
+        self._classes[prepared.name] = prepared
         return cls
 
     def prepare(self, cls: type[C]) -> type[C]:
         """Make a class a dataclass with keyword parameters, unless it is one.
 
         Raises:
-            UserError: Its name cannot be written in a setting, another class of the registry has it, or a method is
-                missing or takes other arguments than it is called with.
+            UserError: It does not inherit the role's base class, its name cannot be written in a setting or is that of
+                another class, or a method is missing or takes other arguments than it is called with.
         """
+        if not (isinstance(cls, type) and issubclass(cls, self.base)):
+            given, base = getattr(cls, "__name__", cls), self.base.__name__
+            article = "an" if self.role[0] in "aeiou" else "a"
+            raise UserError(
+                f"{given}: not {article} {self.role}; give a name, a class that inherits {base}, or an object of one"
+            )
         if not re.fullmatch(r"[\w-]+", cls.name):
             raise UserError(f"{_full_name(cls)}: the name '{cls.name}' must be of letters, digits, '-' and '_'")
         known = self._classes.get(cls.name)

@@ -54,7 +54,7 @@ class Estimator(Component):
         """Take in one cycle and return `log P(NOT_YIELD) - log P(YIELD)`, shape (n,); +-inf for a rule, never NaN."""
 
 
-estimators: Registry[Estimator] = Registry("estimator", "merge_cosim.estimators")
+estimators: Registry[Estimator] = Registry("estimator", "merge_cosim.estimators", Estimator)
 
 E = TypeVar("E", bound=Estimator)
 

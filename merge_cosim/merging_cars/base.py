@@ -41,7 +41,7 @@ class MergingCar(Component):
         return speed
 
 
-merging_cars: Registry[MergingCar] = Registry("merging car", "merge_cosim.merging_cars")
+merging_cars: Registry[MergingCar] = Registry("merging car", "merge_cosim.merging_cars", MergingCar)
 
 M = TypeVar("M", bound=MergingCar)
 

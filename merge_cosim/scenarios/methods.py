@@ -72,9 +72,9 @@ class Method:
             return cls(HUMAN, HUMAN, "")
         settings = settings or {}
         first, second, name = _parts(spec)
-        estimator, estimator_object = _make(estimators, Estimator, first, settings, name)
+        estimator, estimator_object = _make(estimators, first, settings, name)
         chosen = second or estimator.default_controller
-        controller, controller_object = _make(controllers, Controller, chosen, settings, name)
+        controller, controller_object = _make(controllers, chosen, settings, name)
         name = name or (f"{estimator.name}+{controller.name}" if second else estimator.name)
         _take_over(name, estimator, controller, settings)
         values = [(f"{part.name}.{key}", getattr(part, key)) for part in (estimator, controller) for key in _keys(part)]
@@ -143,19 +143,11 @@ def _parts(spec: MethodSpec) -> tuple[MethodPart, MethodPart | None, str]:
     return spec, None, ""
 
 
-def _make(
-    registry: Registry[C], role: type, part: MethodPart, settings: Mapping[str, Any], where: str
-) -> tuple[C, C | None]:
+def _make(registry: Registry[C], part: MethodPart, settings: Mapping[str, Any], where: str) -> tuple[C, C | None]:
     """A component with its settings; and once more, unless its name and parameters are enough to make it anew."""
     if isinstance(part, str):
         return registry.build(part, _own(settings, registry[part]), where), None
-    given = part if isinstance(part, type) else type(part)
-    if not issubclass(given, role):
-        article = "an" if registry.role == "estimator" else "a"
-        raise UserError(
-            f"{given.__name__}: not {article} {registry.role}; give the name, the class or an object of one"
-        )
-    cls = registry.prepare(cast("type[C]", given))
+    cls = registry.prepare(cast("type[C]", part if isinstance(part, type) else type(part)))
     try:
         made = cls() if isinstance(part, type) else cast("C", deepcopy(part))
     except TypeError as error:

@@ -39,7 +39,7 @@ class Sensor(Component):
         """
 
 
-sensors: Registry[Sensor] = Registry("sensor", "merge_cosim.sensors")
+sensors: Registry[Sensor] = Registry("sensor", "merge_cosim.sensors", Sensor)
 
 S = TypeVar("S", bound=Sensor)
 

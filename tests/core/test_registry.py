@@ -12,7 +12,7 @@ from merge_cosim.core.registry import Component, Registry, described
 
 def parts() -> Registry[Component]:
     """A registry of parts, none of which is found by itself."""
-    return Registry("part", "merge_cosim.bench")
+    return Registry("part", "merge_cosim.bench", Component)
 
 
 def part(title: str) -> type[Component]:
@@ -98,3 +98,12 @@ def test_parameters_are_described() -> None:
     assert rows["kind"]["bounds"] == "a, b"
     assert (rows["parts"]["default"], rows["parts"]["bounds"]) == ([1], "")
     assert rows["on"] == {"default": True, "unit": "", "bounds": "true, false", "meaning": ""}
+
+
+def test_what_is_no_class_of_the_role_is_refused() -> None:
+    def rule() -> None: ...
+
+    expected = r"not a part; give a name, a class that inherits Component, or an object of one"
+    for given, name in ((rule, "rule"), (dict, "dict")):
+        with pytest.raises(UserError, match=f"^{name}: {expected}$"):
+            parts().register(given)
