@@ -72,6 +72,17 @@ def test_rates_and_bounds():
     assert (row["cycle_us"], row["cycle_us_single"]) == (1.0, 20.0)
 
 
+def test_only_rows_run_in_sumo_can_disagree_with_it():
+    rows = [
+        {"case": str(i), "method": world, "world": world, "failed": i < 3, "sumo_collision": i == 2}
+        for world in ("sumo", "closed-form")
+        for i in range(5)
+    ]
+    summary = summarise(frame(*rows), {}).set_index("method")
+    assert summary.loc["sumo", "sumo_disagrees"] == 2
+    assert pd.isna(summary.loc["closed-form", "sumo_disagrees"])
+
+
 def test_oracle_best_takes_the_safe_one_then_the_quick_one():
     rows = frame(
         {"case": "a", "method": "always-go", "failed": True, "delay_s": 0.0},

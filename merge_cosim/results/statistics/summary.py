@@ -47,7 +47,7 @@ QUANTILES = {
 COLUMNS = (
     *GROUP,
     *("case", "car", "failed", "failure_kind", "censored", "stuck", "deadlock", "in_support", "extended"),
-    *("host_reached", "sumo_collision", "ambiguity_s", "first_stable_s"),
+    *("host_reached", "world", "sumo_collision", "ambiguity_s", "first_stable_s"),
     *(name for name in SUMMED if name != "unnecessary_yield"),
     *dict.fromkeys(column for column, _ in QUANTILES.values() if column != "hardest_braking"),
 )
@@ -213,7 +213,7 @@ def _take_in(totals: Totals, group: pd.DataFrame, other: pd.DataFrame, against: 
     """
     failed, censored = group["failed"], group["censored"]
     labelled, supported = group["correct_at_merge"].notna(), group["in_support"]
-    own = group["failure_kind"] != "merging_into_host"
+    own, in_sumo = group["failure_kind"] != "merging_into_host", group["world"] == "sumo"
     for name, rows in (
         ("rows", group["case"].notna()),
         ("n", ~censored),
@@ -228,7 +228,8 @@ def _take_in(totals: Totals, group: pd.DataFrame, other: pd.DataFrame, against: 
         ("host_not_reached", ~group["host_reached"]),
         ("labelled", labelled),
         ("first_stable", labelled & group["first_stable_s"].notna()),
-        ("sumo_disagrees", group["sumo_collision"] != failed),
+        ("in_sumo", in_sumo),
+        ("sumo_disagrees", in_sumo & (group["sumo_collision"] != failed)),
     ):
         totals.numbers[name] += int(rows.sum())
     for name in SUMMED:
@@ -299,7 +300,7 @@ def _summary(key: dict[str, str], totals: Totals, cycle_us: Mapping[str, tuple[f
         "order_swapped": sums["order_swapped"].count(),
         "human_station_rms_m": means["human_station_rms_m"],
         "human_speed_rms": means["human_speed_rms"],
-        "sumo_disagrees": numbers["sumo_disagrees"],
+        "sumo_disagrees": numbers["sumo_disagrees"] if numbers["in_sumo"] else None,
         "cycle_us": None if batch_us is None else round(batch_us, 3),
         "cycle_us_single": None if single_us is None else round(single_us, 3),
     }
