@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
 from merge_cosim.core.errors import UserError
+
+PACKAGES = "libatomic1 libexpat1 libgl1 libx11-6 libxext6 libxrender1"
+"""Packages of Debian and Ubuntu with the system libraries that the wheels of SUMO need, also without a window."""
+
+NOT_LOADED = 127
+"""Exit status of a program that the loader could not start."""
 
 _running: set[subprocess.Popen[bytes]] = set()
 
@@ -26,7 +33,7 @@ def run_program(
         captured: Keep what it prints; else it prints where this process does.
 
     Raises:
-        UserError: It cannot be started, or takes too long.
+        UserError: It cannot be started, takes too long, or lacks a system library.
     """
     pipe = subprocess.PIPE if captured else None
     try:
@@ -44,7 +51,15 @@ def run_program(
     finally:
         _end(process)
         _running.discard(process)
+    if process.returncode == NOT_LOADED and (line := missing_library((errors or b"").decode(errors="replace"))):
+        raise UserError(line)
     return subprocess.CompletedProcess(command, process.returncode, output or b"", errors or b"")
+
+
+def missing_library(message: str) -> str | None:
+    """One line that says how to mend it, if a message of Linux's loader is about a system library not found."""
+    found = re.search(r"(lib[\w.+-]+): cannot open shared object file", message)
+    return found and f"SUMO needs the system library {found[1]}; on Debian and Ubuntu: apt-get install {PACKAGES}"
 
 
 def end_programs() -> None:

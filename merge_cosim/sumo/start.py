@@ -14,7 +14,7 @@ from typing import Any
 import sumolib
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.programs import run_program
+from merge_cosim.core.programs import missing_library, run_program
 from merge_cosim.core.units import HOUR
 from merge_cosim.sumo.options import SumoOptions
 from merge_cosim.sumo.session import Session
@@ -35,10 +35,14 @@ class LibsumoSession(Session):
         """Start SUMO.
 
         Raises:
-            UserError: It does not start; the line begins with the file that it is started with.
+            UserError: It does not start; the line begins with the file that it is started with. Or it cannot be loaded.
         """
-        import libsumo
-
+        try:
+            import libsumo
+        except ImportError as error:
+            if line := missing_library(str(error)):
+                raise UserError(line) from None
+            raise
         errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
         words = ["--remote-port", "0"]  # with another port in the configuration SUMO would wait there
         with _said() as said:
@@ -62,7 +66,7 @@ class TraciSession(Session):
         """Start SUMO.
 
         Raises:
-            UserError: It does not start; the line begins with the file that it is started with.
+            UserError: It does not start; the line begins with the file that it is started with. Or it cannot be loaded.
         """
         traci = own_traci()
         errors = (traci.TraCIException, traci.FatalTraCIError)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.programs import run_program
+from merge_cosim.core.programs import PACKAGES, run_program
 
 FAMILY = "sleep 60 & echo $! $$ > pids.new; mv pids.new pids; wait"
 """A shell and its child."""
@@ -73,3 +73,14 @@ def test_a_signal_ends_the_program_too(tmp_path: Path, number: int) -> None:
         status = caller.wait(20)
     assert status == (143 if number == signal.SIGTERM else -signal.SIGINT)
     assert_ended(tmp_path)
+
+
+def test_a_missing_system_library_is_told_with_its_package() -> None:
+    said = (
+        "netconvert: error while loading shared libraries: libatomic.so.1: cannot open shared object file: No such file"
+    )
+    with pytest.raises(UserError, match=r"needs the system library libatomic\.so\.1; .* apt-get install .*libatomic1"):
+        run_program(["sh", "-c", f"echo {said!r} >&2; exit 127"], 60.0, Path("file"))
+    assert run_program(["sh", "-c", "echo other >&2; exit 127"], 60.0, Path("file")).returncode == 127
+    dockerfile = (Path(__file__).parents[2] / "Dockerfile").read_text()
+    assert all(f" {package} " in dockerfile for package in PACKAGES.split())
