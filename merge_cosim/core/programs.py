@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.signals import held_back
 
 PACKAGES = "libatomic1 libexpat1 libgl1 libx11-6 libxext6 libxrender1"
 """Packages of Debian and Ubuntu with the system libraries that the wheels of SUMO need, also without a window."""
@@ -36,21 +37,23 @@ def run_program(
         UserError: It cannot be started, takes too long, or lacks a system library.
     """
     pipe = subprocess.PIPE if captured else None
+    process = None
     try:
-        process = subprocess.Popen(
-            command, cwd=cwd, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, start_new_session=True
-        )
+        with held_back(signal.SIGINT, signal.SIGTERM):  # within Popen they would leave the program behind
+            process = subprocess.Popen(
+                command, cwd=cwd, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, start_new_session=True
+            )
+            _running.add(process)
+        output, errors = process.communicate(timeout=seconds)
     except OSError as error:
         raise UserError(f"{command[0]}: cannot be started ({error.strerror})") from None
-    _running.add(process)
-    try:
-        output, errors = process.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:
         name = Path(command[0]).name
         raise UserError(f"{file}: {name} was still at it after {seconds:g} s and was ended; is it damaged?") from None
     finally:
-        _end(process)
-        _running.discard(process)
+        if process is not None:
+            _end(process)
+            _running.discard(process)
     if process.returncode == NOT_LOADED and (line := missing_library((errors or b"").decode(errors="replace"))):
         raise UserError(line)
     return subprocess.CompletedProcess(command, process.returncode, output or b"", errors or b"")

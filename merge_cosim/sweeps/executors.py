@@ -20,6 +20,7 @@ import pyarrow as pa
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import load_plugin
+from merge_cosim.core.signals import held_back
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue
 from merge_cosim.sweeps.shipping import dumps, main_hidden, pack, unpack
@@ -169,17 +170,13 @@ def interrupts_ignored() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
         yield  # Windows has no masks, and no other thread is interrupted
         return
-    heard: list[int] = []
     resource_tracker.ensure_running()  # would be started along with the first process, and make it hear again
-    handler = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))  # for threads without the mask
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        signal.signal(signal.SIGINT, handler)
-        if heard:
-            signal.raise_signal(signal.SIGINT)
+    with held_back(signal.SIGINT):  # for threads without the mask
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
