@@ -189,7 +189,7 @@ def run(
         plugins: As in `merge_cosim.sweep`.
         world: As in `merge_cosim.sweep`.
         gui: Show it in sumo-gui, with the host's belief and decision as its parameters and the decision as its colour
-            (green: goes first, orange: follows).
+            (blue: goes first, light blue: follows).
         delay: With `gui`: milliseconds per step; 100 is real time.
         trace: File to write the trace to (.csv or .parquet).
         outputs: Files that SUMO is to write.

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
+from merge_cosim.core.colors import HOST, MERGING, ROAD
 from merge_cosim.core.units import DT, FloatArray
 from merge_cosim.ramps.ramp import Way
 
@@ -25,8 +26,6 @@ LANE, WIDTH = 3.7, 1.9
 """Width of a lane and of a car [m]."""
 FAR = 2000.0
 """How far the roads are drawn [m]."""
-HOST, MERGING, ROAD = "#28a03c", "#d23228", "#c9c9c9"
-"""Colours; those of the cars are as in sumo-gui."""
 
 
 def _along(station: float, on_ramp: bool) -> FloatArray:

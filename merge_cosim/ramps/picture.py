@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from merge_cosim.core import colors
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import FloatArray
 from merge_cosim.ramps import polyline
@@ -26,11 +27,11 @@ MAX_CLOSE = 600.0
 MARGIN = 40.0
 """Surroundings shown on either side of the road [m]."""
 COLORS = {
-    "other roads": "#d0d0d0",
-    "main road": "#9ecae1",
-    "on-ramp": "#fdae6b",
-    "host's lane": "#08519c",
-    "merging car's lane": "#d94801",
+    "other roads": colors.PALE,
+    "main road": colors.MAIN_ROAD,
+    "on-ramp": colors.ON_RAMP,
+    "host's lane": colors.HOST,
+    "merging car's lane": colors.MERGING,
 }
 """Of each kind of lane; the later ones are drawn over the earlier."""
 

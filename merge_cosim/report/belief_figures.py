@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 
 from merge_cosim.controllers.acc import Acc
 from merge_cosim.controllers.pcb import Pcb
+from merge_cosim.core import colors
 from merge_cosim.core.encounter import Intention
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import stream_keys
@@ -21,12 +22,10 @@ from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.estimators.pgm import Pgm
 from merge_cosim.report import canvas
 from merge_cosim.report.belief_cases import behind_but_accelerating, pulls_ahead, stays_behind
-from merge_cosim.report.methods import COLORS as METHOD_COLORS
+from merge_cosim.report.methods import KNOWN
 
-COLORS = {Maneuver.YIELD: "#c1121f", Maneuver.NOT_YIELD: "#2a9134", Maneuver.IGNORE: "#8a8a8a"}
-"""Red yields and green does not, as in the DBN-PF blog post."""
+COLORS = {Maneuver.YIELD: colors.YIELDS, Maneuver.NOT_YIELD: colors.DOES_NOT_YIELD, Maneuver.IGNORE: colors.IGNORES}
 NAMES = {Maneuver.YIELD: "yield", Maneuver.NOT_YIELD: "not yield", Maneuver.IGNORE: "ignore"}
-INK = "#111111"
 CLOUDS_AT = 5.5
 """When the clouds are drawn [s]: the second driver has just begun to accelerate."""
 HOST, MERGING, ACCELERATION = (-60.0, 18.0), (-65.0, 18.0), 1.0
@@ -61,11 +60,11 @@ def clouds_figure(model: IntentionModel) -> Figure:
                 of_it = cloud.maneuver[0] == one
                 shares.append(f"{NAMES[one]} {of_it.mean():.0%}")
                 axes.plot(cloud.station[0][of_it], cloud.speed[0][of_it], "o", ms=3.2, mew=0, alpha=0.5, c=COLORS[one])
-            axes.plot(scene.merging_station, scene.merging_speed, "+", color=INK, ms=12, mew=1.8, zorder=5)
+            axes.plot(scene.merging_station, scene.merging_speed, "+", color=colors.INK, ms=12, mew=1.8, zorder=5)
             axes.set_title(f"{title}\n{', '.join(shares)}", loc="left", fontsize=8)
             axes.set_xlabel("station [m]")
         all_axes[0].set_ylabel("speed [m/s]")
-        observed = Line2D([], [], color=INK, ls="", marker="+", ms=9, mew=1.8, label="observed")
+        observed = Line2D([], [], color=colors.INK, ls="", marker="+", ms=9, mew=1.8, label="observed")
         dots = [Line2D([], [], color=COLORS[one], ls="", marker="o", ms=4, label=NAMES[one]) for one in Maneuver]
         figure.legend(handles=[*dots, observed], loc="outside lower center", ncols=4)
     return figure
@@ -87,7 +86,7 @@ def belief_figure(model: IntentionModel) -> Figure:
             time = np.arange(len(scenes)) * DT
             for one, share in zip(Maneuver, np.array(shares).T, strict=True):
                 axes.step(time, share, where="post", color=COLORS[one], label=NAMES[one])
-            axes.step(time, not_yield, where="post", color=INK, lw=1.1, ls=(0, (1, 1.2)), label="P(not yield)")
+            axes.step(time, not_yield, where="post", color=colors.INK, lw=1.1, ls=(0, (1, 1.2)), label="P(not yield)")
             axes.set_title(title, loc="left")
             axes.set(xlabel="time [s]", ylim=(-0.02, 1.02), xlim=(0.0, time[-1]))
         all_axes[0].set_ylabel("belief")
@@ -117,11 +116,11 @@ def candidates_figure(model: IntentionModel) -> Figure:
             label="if the driver does not",
         )
         label = f"ipcb expects, P(not yield) = {p:.2f}"
-        axes.plot(planner.candidates, expected, color=METHOD_COLORS["ipcb"], lw=3.0, alpha=0.7, label=label)
+        axes.plot(planner.candidates, expected, color=KNOWN["ipcb"].color, lw=3.0, alpha=0.7, label=label)
         best = int(expected.argmin())
-        axes.plot(planner.candidates[best], expected[best], "o", color=METHOD_COLORS["ipcb"], ms=9, label="ipcb drives")
+        axes.plot(planner.candidates[best], expected[best], "o", color=KNOWN["ipcb"].color, ms=9, label="ipcb drives")
         label = f"pgm drives, P(not yield) = {_probability(pgm):.2f}"
-        axes.axvline(command, color=METHOD_COLORS["pgm"], lw=1.4, ls="-.", label=label)
+        axes.axvline(command, color=KNOWN["pgm"].color, lw=1.4, ls="-.", label=label)
         axes.set(xlabel="candidate acceleration of the host [m/s²]", ylabel="cost", ylim=(0.0, MOST_COST))
         figure.legend(loc="outside lower center", ncols=2)
     return figure

@@ -12,6 +12,8 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from merge_cosim.core import colors
+
 WIDTH, HEIGHT = 5.4, 3.4
 """Size of a single panel [in]: half a page's width on a desk, all of it on a phone."""
 STYLE: dict[Any, Any] = {
@@ -20,7 +22,7 @@ STYLE: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.color": "#e4e4e4",
+    "grid.color": colors.FAINT,
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "legend.frameon": False,
@@ -29,8 +31,6 @@ STYLE: dict[Any, Any] = {
     "lines.linewidth": 1.6,
     "svg.hashsalt": "merge-cosim",
 }
-FAILED = "#c1121f"
-"""Colour of failures that no method's colour marks."""
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from merge_cosim.core import colors
 from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look, in_order
 
@@ -18,8 +20,9 @@ MOST_LOG_ODDS = 12.0
 """Log-odds beyond this are drawn at the edge: P is 1 to within 1e-5 there."""
 MARGIN_S = 1.0
 """Time drawn after the last host that arrived was scored [s]."""
+MARK_EVERY = 0.12
+"""A method's shape stands on its line at this distance, as a share of the figure's diagonal."""
 NAMES_IN_LABEL = 3
-MERGING = "#111111"
 DASHES = (0, (5, 2.5))
 """Line style of merging cars."""
 
@@ -75,10 +78,10 @@ def log_odds_figure(traces: pd.DataFrame, looks: Mapping[str, Look]) -> Figure |
                 continue
             drawn = True
             odds = np.clip(odds, -MOST_LOG_ODDS, MOST_LOG_ODDS)
-            axes.plot(trace["time_s"], odds, color=looks[method].color, ls=looks[method].line, label=method)
+            axes.plot(trace["time_s"], odds, label=method, **_line(looks[method]))
         if not drawn:
             return None
-        axes.axhline(0.0, color="#777777", lw=0.8, ls=(0, (2, 2)))
+        axes.axhline(0.0, color=colors.GREY, lw=0.8, ls=(0, (2, 2)))
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, -1.0), max(high, 1.0))
         axes.set(xlabel="time [s]", ylabel="log-odds of not yielding\n(< 0: the host goes first)")
@@ -93,7 +96,7 @@ def _draw(paths: list[_Path], looks: Mapping[str, Look], quantity: str, label: s
         shared = _same_merging_car(paths)
         for path in paths:
             look, trace = looks[path.methods[0]], path.trace[path.trace["time_s"] <= end]
-            axes.plot(trace["time_s"], trace[f"host_{quantity}"], color=look.color, ls=look.line, label=path.label)
+            axes.plot(trace["time_s"], trace[f"host_{quantity}"], label=path.label, **_line(look))
             if shared is None:
                 axes.plot(trace["time_s"], trace[f"merging_{quantity}"], color=look.color, lw=0.9, ls=DASHES)
             if path.failed:
@@ -101,14 +104,18 @@ def _draw(paths: list[_Path], looks: Mapping[str, Look], quantity: str, label: s
                 axes.plot(last["time_s"], last[f"host_{quantity}"], "x", color=look.color, ms=9, mew=2.2, zorder=5)
         if shared is not None:
             trace = shared[shared["time_s"] <= end]
-            axes.plot(trace["time_s"], trace[f"merging_{quantity}"], color=MERGING, lw=1.3, ls=DASHES)
-        axes.plot([], [], color=MERGING, lw=1.1, ls=DASHES, label="merging car")
+            axes.plot(trace["time_s"], trace[f"merging_{quantity}"], color=colors.INK, lw=1.3, ls=DASHES)
+        axes.plot([], [], color=colors.INK, lw=1.1, ls=DASHES, label="merging car")
         if quantity == "station_m":
-            axes.axhline(0.0, color="#777777", lw=0.8, ls=(0, (2, 2)))
+            axes.axhline(0.0, color=colors.GREY, lw=0.8, ls=(0, (2, 2)))
         axes.set(xlabel="time [s]", ylabel=label)
         axes.set_xlim(0.0, end * 1.02)
         _legend(figure)
     return figure
+
+
+def _line(look: Look) -> dict[str, Any]:
+    return {"color": look.color, "ls": look.line, "marker": look.mark, "markevery": MARK_EVERY, "ms": 4}
 
 
 def _legend(figure: Figure) -> None:

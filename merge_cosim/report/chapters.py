@@ -113,11 +113,10 @@ def chapter(
         "beliefs": page_data.belief_data(rows, section.site) if beliefs is not None else None,
         "cases": [i for i, one in enumerate(recorded) if one["scenario"] == section.scenario and one["case"] in own],
     }
-    site = "all sites" if section.site == ALL_SITES else section.site
     return Chapter(
         key=f"t{number}",
         section=section,
-        title=scenario["title"] if section.source in NO_SITES else f"{scenario['title']}, {site}",
+        title=_title(scenario["title"], section.site, section.source),
         source=SOURCES.get(section.source, section.source),
         about=" ".join(scenario["about"].split()),
         verdict=said,
@@ -126,6 +125,13 @@ def chapter(
         tables=found,
         data=data,
     )
+
+
+def _title(title: str, site: str, source: str) -> str:
+    """The scenario's title, with the site where it does not name it."""
+    if source in NO_SITES or site in title.lower().replace("-", ""):
+        return title
+    return f"{title}, {'all sites' if site == ALL_SITES else site}"
 
 
 def _notes(section: Section, rows: pd.DataFrame, scenario: dict[str, Any], manifest: dict[str, Any]) -> list[str]:

@@ -17,6 +17,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
+from merge_cosim.core import colors
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT, FloatArray
 from merge_cosim.ramps.export.lanelets import Lanelet, lanelets
@@ -39,7 +40,6 @@ CAR_WIDTH = 1.8
 """Width of both cars [m]; encounters hold lengths only."""
 NAMES_AT = 3.4
 """How far above the host and below the merging car their names stand [m]."""
-HOST, MERGING, ROAD, LINE = "#1b7f34", "#c4271d", "#dcdcdc", "#ffffff"
 
 
 @dataclass(frozen=True)
@@ -170,23 +170,23 @@ class _Frame:
             side.set_visible(False)
         axes.grid(visible=False)
         for lane in road.values():
-            axes.add_patch(Polygon(np.concatenate([lane.left, lane.right[::-1]]), facecolor=ROAD, lw=0))
+            axes.add_patch(Polygon(np.concatenate([lane.left, lane.right[::-1]]), facecolor=colors.ROAD, lw=0))
         for lane in road.values():
             if lane.left_lane is not None:
-                axes.plot(*lane.left.T, color=LINE, lw=1.4, ls=(0, (6, 6)))
+                axes.plot(*lane.left.T, color="white", lw=1.4, ls=(0, (6, 6)))
         half = 0.5 * (BEHIND + AHEAD) * ROAD_SHARE * SIZE[1] / SIZE[0]
         axes.set_ylim(-half, half)
-        axes.axvline(0.0, color="#555555", lw=1.0, ls=":")
-        axes.text(0.8, half * 0.86, "merging point", color="#555555", fontsize=8, clip_on=True)
+        axes.axvline(0.0, color=colors.GREY, lw=1.0, ls=":")
+        axes.text(0.8, half * 0.86, "merging point", color=colors.GREY, fontsize=8, clip_on=True)
         self._bodies = [
             Polygon(np.zeros((4, 2)), facecolor=color, edgecolor="black", lw=0.8, hatch=hatch, zorder=5)
-            for color, hatch in ((HOST, None), (MERGING, "////"))
+            for color, hatch in ((colors.HOST, None), (colors.MERGING, "////"))
         ]
         for body in self._bodies:
             axes.add_patch(body)
         self._names = [
             axes.text(0, 0, name, ha="center", va=va, fontsize=9, color=color, clip_on=True)
-            for name, color, va in (("host", HOST, "bottom"), ("merging car", MERGING, "top"))
+            for name, color, va in (("host", colors.HOST, "bottom"), ("merging car", colors.MERGING, "top"))
         ]
         self.belief = self._bar()
         place: dict[str, Any] = {"transform": self.figure.transFigure}
@@ -198,16 +198,16 @@ class _Frame:
             "clock": text(0.98, 0.935, "", fontsize=11, ha="right", family="monospace", **place),
             "belief": text(0.345, 0.117, "", fontsize=12, va="center", ha="right", **place),
             "decision": text(0.40, 0.10, "", fontsize=16, fontweight="bold", **place),
-            "host": text(0.58, 0.19, "", fontsize=10, family="monospace", color=HOST, **place),
-            "merging": text(0.58, 0.09, "", fontsize=10, family="monospace", color=MERGING, **place),
+            "host": text(0.58, 0.19, "", fontsize=10, family="monospace", color=colors.HOST, **place),
+            "merging": text(0.58, 0.09, "", fontsize=10, family="monospace", color=colors.MERGING, **place),
         }
 
     def _bar(self) -> Rectangle:
         axes = self.figure.add_axes((0.02, 0.08, 0.27, 0.075), xlim=(0, 1), ylim=(0, 1), yticks=[])
         axes.set_xticks([0, 0.5, 1], ["0", "½", "1"], fontsize=8)
         axes.grid(visible=False)
-        axes.axvline(0.5, color="#555555", lw=1.0)
-        bar = Rectangle((0, 0), 0.0, 1.0, facecolor="#6a3d9a")
+        axes.axvline(0.5, color=colors.GREY, lw=1.0)
+        bar = Rectangle((0, 0), 0.0, 1.0, facecolor=colors.INDIGO)
         axes.add_patch(bar)
         return bar
 

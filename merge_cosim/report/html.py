@@ -10,6 +10,7 @@ from typing import Any
 import jinja2
 from matplotlib.figure import Figure
 
+from merge_cosim.core import colors
 from merge_cosim.report.canvas import style
 
 DPI = 96
@@ -56,4 +57,4 @@ def render(template: str, **values: Any) -> str:
         undefined=jinja2.StrictUndefined,
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
-    return environment.get_template(template).render(values)
+    return environment.get_template(template).render(values, colors=colors)

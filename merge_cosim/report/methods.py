@@ -1,32 +1,20 @@
-"""Order, colours and line styles of the methods: the same in every table and figure."""
+"""Order and looks of the methods: the same in every table and figure, of the page and for papers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import product
 
+from merge_cosim.core import colors
 from merge_cosim.scenarios.methods import REFERENCES, is_reference
 
-FAMILIES = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg", "fg-gmm", "dbn-pf")
-"""The papers' methods, in the order of their tables; a variant (`pgm-time`) follows its family."""
-
-COLORS = {
-    "acc": "#0072B2",
-    "slot": "#44AA99",
-    "slot-time": "#117733",
-    "ipcb": "#C6A700",
-    "pgm-g": "#882255",
-    "pgm": "#D55E00",
-    "pgm-time": "#E69F00",
-    "pgm-speed": "#CC79A7",
-    "fg": "#56B4E9",
-    "fg-gmm": "#332288",
-    "dbn-pf": "#999933",
-}
-"""Colours that stay apart under the common kinds of colour blindness (after Okabe and Ito, and Tol)."""
-OTHER_COLORS = ("#AA4499", "#661100", "#6699CC", "#88CCEE", "#AA4466", "#4477AA", "#228833", "#EE6677")
-GREYS = ("#000000", "#6b6b6b", "#a3a3a3")
-GREY_LINES = ("-", "-.")
+FAMILIES = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg", "fg-gmm", "dbn-pf", "interactive")
+"""The methods in the order of the papers' tables; a variant (`pgm-time`) follows its family."""
+MARKS = "os^DvPX*ph"
+"""Shapes in matplotlib's words, of which `templates/draw.js` has the same."""
+DASHES = ("", "7 3", "9 3 2 3", "13 3", "5 2 2 2 2 2")
+"""Dashes of a page's lines, as SVG writes them; dots are kept for merging cars."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +23,52 @@ class Look:
 
     Attributes:
         color: Its colour everywhere.
+        mark: Its shape, in matplotlib's words; no two methods of a figure have both in common.
         line: Matplotlib's line style; dashes are kept for merging cars.
     """
 
     color: str
+    mark: str = "o"
     line: str = "-"
+
+    @property
+    def dash(self) -> str:
+        """The dashes of its line in a page, as SVG writes them."""
+        return DASHES[MARKS.index(self.mark) % len(DASHES)]
+
+
+FAMILY_COLORS = {
+    "acc": colors.BLUE,
+    "slot": colors.GREEN,
+    "ipcb": colors.ORANGE,
+    "pgm-g": colors.PURPLE,
+    "pgm": colors.VERMILION,
+    "fg": colors.SKY,
+    "fg-gmm": colors.INDIGO,
+    "dbn-pf": colors.WINE,
+    "interactive": colors.BROWN,
+}
+"""A family has a colour, and each of its variants a shape."""
+_SHAPES = {
+    "acc": "o",
+    "slot": "s",
+    "slot-time": "X",
+    "ipcb": "^",
+    "pgm-g": "v",
+    "pgm": "D",
+    "pgm-symmetric": "p",
+    "pgm-time": "^",
+    "pgm-speed": "s",
+    "fg": "P",
+    "fg-time": "v",
+    "fg-gmm": "*",
+    "fg-gmm-joint": "o",
+    "fg-gmm-time": "s",
+    "dbn-pf": "X",
+    "interactive": "h",
+}
+GREYS = (colors.BLACK, colors.GREY, colors.SILVER)
+GREY_LINES = ("-", "-.")
 
 
 def in_order(methods: Iterable[str]) -> list[str]:
@@ -48,20 +77,41 @@ def in_order(methods: Iterable[str]) -> list[str]:
 
 
 def looks(methods: Iterable[str]) -> Mapping[str, Look]:
-    """Give each method its look; a known method has the same one in every figure."""
+    """Give each method its look; a known method has the same one in every figure.
+
+    Another one has the colour of its family, if it has one, and a shape that no other method has in that colour.
+    """
     ordered = in_order(methods)
-    others = [method for method in ordered if method not in COLORS and not is_reference(method)]
-    chosen = {method: Look(COLORS[method]) for method in ordered if method in COLORS}
-    chosen |= {method: Look(OTHER_COLORS[i % len(OTHER_COLORS)]) for i, method in enumerate(others)}
-    for method in filter(is_reference, ordered):
-        i = REFERENCES.index(method.partition("+")[0])
-        chosen[method] = Look(GREYS[i % len(GREYS)], GREY_LINES[i // len(GREYS)])
+    chosen = {method: KNOWN[method] for method in ordered if method in KNOWN}
+    for method in ordered:
+        if is_reference(method):
+            i = REFERENCES.index(method.partition("+")[0])
+            chosen[method] = Look(GREYS[i % len(GREYS)], MARKS[i % len(MARKS)], GREY_LINES[i // len(GREYS)])
+        elif method not in KNOWN:
+            chosen[method] = _free(_family(method), chosen.values())
     return chosen
+
+
+def _free(family: str | None, taken: Iterable[Look]) -> Look:
+    used = {(look.color, look.mark) for look in taken} | {(look.color, look.mark) for look in KNOWN.values()}
+    hues = [FAMILY_COLORS[family]] if family else [colors.OLIVE, *colors.DISTINCT]
+    pairs = [*((hue, mark) for mark, hue in product(MARKS, hues)), *product([colors.OLIVE], MARKS)]
+    color, mark = next((pair for pair in pairs if pair not in used), pairs[len(used) % len(pairs)])
+    return Look(color, mark)
+
+
+def _family(method: str) -> str | None:
+    estimator = method.partition("+")[0]
+    own = [family for family in FAMILIES if estimator == family or estimator.startswith((f"{family}-", f"{family}_"))]
+    return max(own, key=len, default=None)
+
+
+KNOWN = {method: Look(FAMILY_COLORS[_family(method) or method], mark) for method, mark in _SHAPES.items()}
+"""The looks of the methods that come with the package."""
 
 
 def _rank(method: str) -> tuple[int, int, str]:
     if is_reference(method):
         return 2, REFERENCES.index(method.partition("+")[0]), method
-    estimator = method.partition("+")[0]
-    own = [family for family in FAMILIES if estimator == family or estimator.startswith((f"{family}-", f"{family}_"))]
-    return (0, FAMILIES.index(max(own, key=len)), method) if own else (1, 0, method)
+    family = _family(method)
+    return (0, FAMILIES.index(family), method) if family else (1, 0, method)

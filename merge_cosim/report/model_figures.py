@@ -9,6 +9,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
+from merge_cosim.core import colors
 from merge_cosim.core.encounter import Intention
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.evidence import SpeedDensity
@@ -19,7 +20,7 @@ from merge_cosim.estimators.pgm import Pgm
 from merge_cosim.estimators.pgm_g import PgmG
 from merge_cosim.report import canvas
 
-COLORS = {Intention.YIELD: "#0072B2", Intention.NOT_YIELD: "#D55E00"}
+COLORS = {Intention.YIELD: colors.YIELDS, Intention.NOT_YIELD: colors.DOES_NOT_YIELD}
 NAMES = {Intention.YIELD: "yield", Intention.NOT_YIELD: "not yield"}
 CELL = (2.7, 2.5)
 MOST_PANELS = 6
@@ -90,7 +91,7 @@ def arrival_figure(model: IntentionModel, uniform: float = Pgm().uniform) -> Fig
         axes[2].set_title("log-odds of not yield")
         figure.colorbar(shown, ax=axes[2], shrink=0.6)
         for ax in axes:
-            ax.plot([0, LONGEST_TIME], [0, LONGEST_TIME], color="#999999", lw=0.8, ls=":")
+            ax.plot([0, LONGEST_TIME], [0, LONGEST_TIME], color=colors.GREY, lw=0.8, ls=":")
             ax.grid(False)
         figure.supxlabel("host's time to arrival $T_h$ [s]", fontsize=9)
         figure.supylabel("merging car's $T_m$ [s]", fontsize=9)
@@ -153,9 +154,9 @@ def gaussian_figure(model: IntentionModel, lag: int = 1) -> Figure:
             for i in Intention.YIELD, Intention.NOT_YIELD:
                 ax.stairs(values[i, first:last], edges, baseline=None, color=COLORS[i], lw=1.6, label=NAMES[i])
             ax.set_title(title)
-        axes[1].axhline(floor, color="#777777", lw=0.8, ls=":")
-        axes[1].annotate("floor", (edges[0], floor), (2, 2), textcoords="offset points", fontsize=8, color="#777777")
-        axes[0].axhline(0.0, color="#777777", lw=0.8)
+        axes[1].axhline(floor, color=colors.GREY, lw=0.8, ls=":")
+        axes[1].annotate("floor", (edges[0], floor), (2, 2), textcoords="offset points", fontsize=8, color=colors.GREY)
+        axes[0].axhline(0.0, color=colors.GREY, lw=0.8)
         axes[0].legend()
         figure.supxlabel(f"$V_{{t-{lag}}}$ [m/s]", fontsize=9)
         figure.supylabel("[m/s]", fontsize=9)

@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
+from merge_cosim.core import colors
 from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look
 
-MARKS = ("o", "s", "^", "D", "v", "P")
-"""Signs of methods in figures of lines, in turn, so that they can be told apart without colour."""
 ANGLES = np.arange(16) * np.pi / 8
 REACHES = (7.0, 12.0, 18.0, 26.0, 36.0, 50.0, 70.0)
 """Distances from a dot at which its label is tried [pt]."""
@@ -46,14 +45,15 @@ def tradeoff_figure(rows: Sequence[Mapping[str, Any]], looks: Mapping[str, Look]
         for row in known:
             x, y = float(np.clip(row["delay"], left, right)), float(min(row["bad_pct"], top))
             beyond = (x, y) != (row["delay"], row["bad_pct"])
-            color, hollow = looks[row["method"]].color, row["reference"]
+            look, hollow = looks[row["method"]], row["reference"]
+            color = look.color
             if not beyond:
                 for low, high, along in (("bad_low", "bad_high", "y"), ("delay_low", "delay_high", "x")):
                     if row[low] is not None:
                         ends = [row[low], row[high]]
                         xs, ys = ([x, x], ends) if along == "y" else (ends, [y, y])
                         axes.plot(xs, ys, color=color, lw=0.9, alpha=0.6, solid_capstyle="butt")
-            mark = {True: ">" if row["delay"] > right else "<" if row["delay"] < left else "^", False: "o"}[beyond]
+            mark = (">" if row["delay"] > right else "<" if row["delay"] < left else "^") if beyond else look.mark
             size = 8.0 if row["best"] else 5.5
             face = "white" if hollow else color
             axes.plot(x, y, mark, ms=size, mfc=face, mec=color, mew=1.2, clip_on=False, zorder=4)
@@ -79,11 +79,13 @@ def lines_figure(
     """
     with canvas.style():
         figure, axes = canvas.panel()
-        for i, one in enumerate(series):
-            look = {"color": looks[one["name"]].color, "marker": MARKS[i % len(MARKS)], "ms": 4, "lw": 1.2}
-            axes.plot(one["x"], one["y"], label=one["name"], **look)
+        for one in series:
+            look = looks[one["name"]]
+            axes.plot(
+                one["x"], one["y"], look.line, color=look.color, marker=look.mark, ms=4, lw=1.2, label=one["name"]
+            )
         if diagonal:
-            axes.plot([0, 100], [0, 100], color="#777777", lw=0.8, ls=(0, (2, 2)))
+            axes.plot([0, 100], [0, 100], color=colors.GREY, lw=0.8, ls=(0, (2, 2)))
             axes.set(xlim=(0, 100), ylim=(0, 102))
         axes.set(xlabel=labels[0], ylabel=labels[1])
         canvas.legend_below(figure, *axes.get_legend_handles_labels(), markerscale=0.8)
@@ -117,7 +119,7 @@ def _label(figure: Figure, axes: Any, places: Sequence[tuple[float, float, str, 
         if reach > REACHES[2]:
             end = np.clip(at, [moved.x0, moved.y0], [moved.x1, moved.y1])
             (x0, y0), (x1, y1) = axes.transData.inverted().transform([at, end])
-            axes.plot([x0, x1], [y0, y1], color="#888888", lw=0.5, zorder=3, clip_on=False)
+            axes.plot([x0, x1], [y0, y1], color=colors.GREY, lw=0.5, zorder=3, clip_on=False)
 
 
 def _common(one: Bbox, other: Bbox) -> float:

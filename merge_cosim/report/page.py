@@ -97,7 +97,7 @@ def read_report(folder: Path, against: str | None = None) -> Report:
         f"{scenario}-{name}": tables.variation_table(summary, scenario, name)
         for scenario, name in tables.varied_parameters(summary)
     }
-    contacts = collisions.collision_table(results) if len(tables.simulated(results)) else None
+    contacts = collisions.collision_table(results) if len(tables.runs_in_sumo(results)) else None
     traffic = traffic_table(store.traffic())
     return Report(manifest, results, summary, traces, recorded, left_out, chapters, variations, contacts, traffic)
 
@@ -170,6 +170,7 @@ def _compared(rows: list[dict[str, Any]], results: pd.DataFrame, against: str | 
 
 def _provenance(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, str]:
     simulated = tables.simulated(results)
+    methods, jobs = simulated["method"].nunique(), manifest["command"]["jobs"]
     moved = {"sumo": "in SUMO", "closed-form": "in the closed form, without SUMO"}
     counted = results.groupby(["scenario", "source", "site"])["case"].nunique().reset_index()
     cases = [
@@ -182,14 +183,14 @@ def _provenance(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, st
     return {
         "Cases": "; ".join(cases),
         "Sources": "; ".join(f"{source}: {SOURCES.get(source, source)}" for source in sources),
-        "Runs": f"{len(simulated):,} {moved[manifest['world']]}, under {simulated['method'].nunique()} method(s)",
+        "Runs": f"{len(simulated):,} {moved[manifest['world']]}, under {methods} method{'s' * (methods > 1)}",
         "Methods": ", ".join(in_order(results["method"])),
         "Models": ", ".join(f"{name} ({digest})" for name, digest in manifest["models"].items()) or "none",
         "Set": settings or "nothing: all parameters at their defaults",
         "Varied": varied or "nothing",
         "Seed": str(manifest["seed"]),
         "Versions": ", ".join(f"{name} {number}" for name, number in manifest["versions"].items()),
-        "Wall time": f"{manifest['wall_s']:,.1f} s with {manifest['command']['jobs']} process(es)",
+        "Wall time": f"{manifest['wall_s']:,.1f} s with {jobs} process{'es' * (jobs > 1)}",
         "Speed": f"{manifest['vehicle_steps_per_s'] or 0:,} vehicle-steps per second",
         **(_of_sumo(manifest, sources) if manifest["world"] == "sumo" else {}),
     }

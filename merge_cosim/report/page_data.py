@@ -24,10 +24,10 @@ CALIBRATED_AT = 40
 
 
 def method_looks(looks: Mapping[str, Look]) -> dict[str, Any]:
-    """Colour of each method, and whether it is a reference, which is drawn hollow."""
+    """Colour, shape and dashes of each method, and whether it is a reference, which is drawn hollow."""
     return {
-        name: {"color": look.color, "reference": is_reference(name), "order": place}
-        for place, (name, look) in enumerate((name, looks[name]) for name in in_order(looks))
+        name: {"color": look.color, "mark": look.mark, "dash": look.dash, "reference": is_reference(name)}
+        for name, look in ((name, looks[name]) for name in in_order(looks))
     }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from merge_cosim.core import colors
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look, in_order
@@ -89,7 +90,7 @@ def failure_map(results: pd.DataFrame) -> Figure:
         for ax, (method, part) in zip(axes, parts.items(), strict=True):
             image = ax.pcolormesh(*edges, 100 * part, vmin=0, vmax=100 * top, cmap="YlOrRd", linewidth=0)
             row, column = np.nonzero(shares.absent[method])
-            ax.scatter(shares.mergings[column], shares.hosts[row], s=1.2, color="#333333", linewidths=0)
+            ax.scatter(shares.mergings[column], shares.hosts[row], s=1.2, color=colors.INK, linewidths=0)
             ax.set_title(canvas.broken(method))
             ax.grid(False)
             ax.set_aspect("auto")
@@ -115,9 +116,9 @@ def ambiguity_figure(results: pd.DataFrame, looks: Mapping[str, Look]) -> Figure
             color = looks[method].color
             ax.scatter(x[~failed & ~beyond], y[~failed & ~beyond], s=7, color=color, alpha=0.45, linewidths=0)
             ax.scatter(x[~failed & beyond], y[~failed & beyond], s=12, marker="^", color=color, alpha=0.45, lw=0)
-            ax.scatter(x[failed], y[failed], s=26, marker="x", color=canvas.FAILED, linewidths=1.3, zorder=4)
+            ax.scatter(x[failed], y[failed], s=26, marker="x", color=colors.FAILED, linewidths=1.3, zorder=4)
             for edge in AMBIGUITY_EDGES[1:-1]:
-                ax.axvline(edge, color="#bbbbbb", lw=0.8, zorder=0)
+                ax.axvline(edge, color=colors.SILVER, lw=0.8, zorder=0)
             ax.set_title(canvas.broken(method))
         axes[0].set_xlim(0.0, right * 1.04)
         axes[0].set_ylim(top=top * 1.06)
@@ -153,7 +154,7 @@ def variation_figure(summary: pd.DataFrame, parameter: str, looks: Mapping[str, 
                 look = looks[method]
                 if is_scale:
                     x = numbers.to_numpy(dtype=float)
-                    ax.plot(x, rate, look.line, marker="o", ms=4, color=look.color, label=method)
+                    ax.plot(x, rate, look.line, marker=look.mark, ms=4, color=look.color, label=method)
                     ax.fill_between(x, low, high, color=look.color, alpha=0.12, lw=0)
                     for level in base.loc[base["method"] == method, "failure_pct"].dropna():
                         ax.axhline(level, color=look.color, lw=1.0, ls=":")
@@ -182,7 +183,7 @@ def _bars(ax: Any, i: int, n: int, rate: FloatArray, low: FloatArray, high: Floa
     x = np.arange(len(rate)) + (i - (n - 1) / 2) * width
     ax.bar(x, rate, 0.92 * width, color=look.color, label=name)
     if np.isfinite(low).any():
-        ax.errorbar(x, rate, [rate - low, high - rate], fmt="none", ecolor="#333333", elinewidth=0.8, capsize=2)
+        ax.errorbar(x, rate, [rate - low, high - rate], fmt="none", ecolor=colors.INK, elinewidth=0.8, capsize=2)
     elif n * len(rate) <= MOST_NUMBERS:
         for place, height in zip(x, rate, strict=True):
             ax.annotate(f"{height:.1f}", (place, height), (0, 1), textcoords="offset points", ha="center", fontsize=7)

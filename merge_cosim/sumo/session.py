@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from merge_cosim.core.colors import FOLLOWS, Rgba, rgba
 from merge_cosim.sumo.modes import LaneChangeMode, SpeedMode
 from merge_cosim.sumo.vehicle_types import CONTROLLED, RGBA
 
@@ -15,13 +16,9 @@ SPEED_OF_SUMO = -1.0
 """The commanded speed that gives a vehicle back to its car-following model."""
 _SETTERS = {"minGap": "setMinGap", "sigma": "setImperfection", "speedDev": "setSpeedDeviation"}
 """By the attributes of a type, what sets them in a running SUMO."""
-FOLLOWS: Color = (240, 140, 0, 255)
-"""Colour of a host that follows its merging car, in a window."""
 _VIEW, _ZOOM = "View #0", 1500.0
 
 Errors = tuple[type[Exception], ...]
-Color = tuple[int, int, int, int]
-"""Red, green, blue and opacity, 0 to 255."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ class Car:
 
     name: str
     route: tuple[str, ...]
-    color: Color
+    color: Rgba
 
 
 class Neighbour(NamedTuple):
@@ -110,7 +107,7 @@ class Session:
         self.length: Callable[[str], float] = vehicle.getLength
         self.min_gap: Callable[[str], float] = vehicle.getMinGap
         self.set_length: Callable[[str, float], object] = vehicle.setLength
-        self.set_color: Callable[[str, Color], object] = vehicle.setColor
+        self.set_color: Callable[[str, Rgba], object] = vehicle.setColor
         self.remove: Callable[[str], object] = vehicle.remove
         self.vehicles: Callable[[], Sequence[str]] = vehicle.getIDList
         self.vehicle_count: Callable[[], int] = vehicle.getIDCount
@@ -250,6 +247,6 @@ class Session:
         """Show what a host believes and decides: as parameters of the vehicle, and the decision as its colour."""
         follows = log_odds >= 0.0
         belief = f"{0.5 + 0.5 * math.tanh(0.5 * log_odds):.2f}"
-        self.set_color(host, FOLLOWS if follows else RGBA["host"])
+        self.set_color(host, rgba(FOLLOWS) if follows else RGBA["host"])
         self._api.vehicle.setParameter(host, "P(merging car does not yield)", belief)
         self._api.vehicle.setParameter(host, "decision", "follows it" if follows else "goes first")

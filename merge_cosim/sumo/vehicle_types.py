@@ -10,6 +10,8 @@ from typing import Any, Literal
 from lxml import etree
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from merge_cosim.core import colors
+from merge_cosim.core.colors import rgba
 from merge_cosim.sumo.xml import element, number, write_xml
 
 ROLE = "merge-cosim.role"
@@ -17,8 +19,8 @@ ROLE = "merge-cosim.role"
 MERGE_POSITION = "merge-cosim.merge-position"
 """Parameter of the merging car's type: where its station 0 lies, in m past the gore."""
 
-RGBA = {"host": (40, 160, 60, 255), "merging": (210, 50, 40, 255)}
-"""Host and merging car, as in the papers' figures."""
+RGBA = {"host": rgba(colors.HOST), "merging": rgba(colors.MERGING)}
+"""Colours of host and merging car."""
 COLORS = {role: ",".join(map(str, rgba[:3])) for role, rgba in RGBA.items()}
 """The same as text of SUMO's files."""
 

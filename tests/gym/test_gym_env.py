@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import merge_cosim as mc
+from merge_cosim.core.colors import HOST, MERGING, rgba
 from merge_cosim.core.features import FEATURES
 from merge_cosim.gym import NAME
 from merge_cosim.gym.drawing import LANE, Drawing, body
@@ -197,9 +198,10 @@ def test_cars_are_drawn_where_they_are():
     assert body(-60.0, 5.0, on_ramp=True)[:, 1].max() < -LANE
     frame = Drawing("main").frame(np.array([-50.0, -60.0, 15.0, 14.0, 5.0, 5.0]), 1.2)
     assert frame.shape == (220, 800, 3)
-    green, red = (np.argwhere((frame == color).all(axis=2)) for color in ((40, 160, 60), (210, 50, 40)))
-    assert green[:, 0].min() < red[:, 0].min()  # the main road is above the ramp
+    host_color, merging_color = (rgba(color)[:3] for color in (HOST, MERGING))
+    host, merging = (np.argwhere((frame == color).all(axis=2)) for color in (host_color, merging_color))
+    assert host[:, 0].min() < merging[:, 0].min()  # the main road is above the ramp
     turned = Drawing("ramp").frame(np.array([-60.0, -50.0, 14.0, 15.0, 5.0, 5.0]), 1.2)
-    assert np.argwhere((turned == (40, 160, 60)).all(axis=2))[:, 0].min() == red[:, 0].min()
-    column = green[green[:, 1] < 510, 1].mean()
+    assert np.argwhere((turned == host_color).all(axis=2))[:, 0].min() == merging[:, 0].min()
+    column = host[host[:, 1] < 510, 1].mean()
     assert abs(column / 800 * 160 - (100.0 - 2.5)) / 160 < 0.02

@@ -1,14 +1,16 @@
 """Order, headings and numbers of the tables."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from merge_cosim.core.colors import rgba
 from merge_cosim.report.columns import Column, Table
-from merge_cosim.report.methods import COLORS, in_order, looks
+from merge_cosim.report.methods import FAMILY_COLORS, KNOWN, in_order, looks
 from merge_cosim.report.published import published
 from merge_cosim.report.tables import Section, main_table, sections, strata_table, summary_frame, variation_table
 from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
-from merge_cosim.scenarios.methods import is_reference
+from merge_cosim.scenarios.methods import REFERENCES, is_reference
 
 GRID = Section("designed-2", "designed", "designed")
 
@@ -38,7 +40,41 @@ def test_methods_come_first_and_references_last():
 
 def test_a_method_keeps_its_colour():
     assert looks(["pgm", "mine"])["pgm"] == looks(["acc", "pgm", "always-go"])["pgm"]
-    assert len(set(COLORS.values())) == len(COLORS)
+
+
+def test_no_two_methods_look_alike():
+    methods = [
+        *KNOWN,
+        *(f"{name}+{law}" for name in ("pgm", "acc") for law in ("lqr", "pcb")),
+        *"abcdefgh",
+        *REFERENCES,
+    ]
+    found = looks(methods)
+    assert len({(look.color, look.mark) for look in found.values()}) == len(set(methods))
+    assert found["pgm+lqr"].color == found["pgm"].color
+
+
+DEFICIENCIES = {
+    "normal": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.3039]],
+}
+"""Linear RGB as it is seen (Machado, Oliveira, Fernandes 2009, severity 1)."""
+
+
+@pytest.mark.parametrize("deficiency", DEFICIENCIES)
+def test_families_are_told_apart_by_the_colour_blind(deficiency):
+    """Their colours differ by at least 15 in CIELAB; just noticeable is 2.3."""
+    encoded = np.array([rgba(color)[:3] for color in FAMILY_COLORS.values()]) / 255
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ np.transpose(DEFICIENCIES[deficiency]), 0, 1)
+    xyz = seen @ np.transpose([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    share = xyz / [0.9505, 1, 1.089]
+    f = np.where(share > 0.008856, np.cbrt(share), 7.787 * share + 16 / 116)
+    lab = np.stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])], axis=1)
+    apart = np.linalg.norm(lab[:, None] - lab[None], axis=2)
+    assert apart[~np.eye(len(lab), dtype=bool)].min() > 15
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,15 @@
 // The trade-off chart and plots of lines with labels at their ends.
 const TEXT_HEIGHT = 14;
-const textWidth = (text) => 6.7 * text.length + 4;
+const measuring = document.createElement("canvas").getContext("2d");
+function textWidth(text, weight = 400) {
+  measuring.font = `${weight} 12px ${getComputedStyle(document.body).fontFamily}`;
+  return measuring.measureText(text).width + 6;
+}
 
 function tradeoff(element, rows, width) {
   const known = rows.filter((row) => row.bad_pct !== null && row.delay !== null);
   if (!known.length) { element.textContent = "No case could be scored."; return; }
-  const height = clamp(width * 0.68, 320, 470);
+  const height = clamp(width * 0.68, 320, 470 + 8 * Math.max(0, rows.length - 14));
   const rivals = known.filter((row) => !row.reference);
   const inside = rivals.length ? rivals : known;
   const ends = (low, value, high) => inside.flatMap((row) => [row[low], row[value], row[high]].filter((one) => one !== null));
@@ -31,7 +35,7 @@ function tradeoff(element, rows, width) {
   for (const { row, off, x: px, y: py } of dots) {
     const shape = { class: `dot m pick${row.reference ? " hollow" : ""}`, style: look(row.method), "data-method": row.method, "data-watch": row.method };
     const turn = row.delay > x[1] ? 0 : row.delay < x[0] ? 180 : -90;
-    const mark = off ? svg("path", { ...shape, d: "M-5 5L5 0L-5-5Z", transform: `translate(${px} ${py}) rotate(${turn})` }) : svg("circle", { ...shape, cx: px, cy: py, r: row.best ? 8 : 5.5 });
+    const mark = off ? svg("path", { ...shape, d: "M-5 5L5 0L-5-5Z", transform: `translate(${px} ${py}) rotate(${turn})` }) : marker(row.method, px, py, row.best ? 7.5 : 5.5, shape);
     mark.append(svg("title", {}, `${row.method}: ${row.failed} failed, ${row.stuck} stuck of ${row.n}; delay ${row.delay.toFixed(2)} s`));
     f.root.append(mark);
   }
@@ -43,7 +47,7 @@ function placeLabel(f, dot, most = 99) {
   const { row, off } = dot;
   const name = row.method.length > most ? `${row.method.slice(0, most)}…` : row.method;
   const text = name + (row.best ? " ★" : "") + (off ? ` (${row.delay.toFixed(1)} s, ${row.bad_pct.toFixed(0)} %)` : "");
-  const w = textWidth(text), h = TEXT_HEIGHT;
+  const w = textWidth(text, row.best ? 650 : 400), h = TEXT_HEIGHT;
   let best = null;
   for (const reach of [10, 16, 22, 30, 44, 60, 80, 105, 135]) {
     for (let turn = 0; turn < 16; turn++) {
@@ -62,7 +66,7 @@ function placeLabel(f, dot, most = 99) {
     const end = [clamp(dot.x, best.box[0], best.box[2]), clamp(dot.y, best.box[1] + 3, best.box[3] - 3)];
     f.root.append(svg("line", { class: "lead-line", "data-method": row.method, x1: dot.x, y1: dot.y, x2: end[0], y2: end[1] }));
   }
-  f.root.append(svg("text", { x: best.box[0] + 2, y: best.box[3] - 3, class: row.best ? "strong" : row.reference ? "label-ref" : "", "data-method": row.method }, text));
+  f.root.append(svg("text", { x: best.box[0] + 3, y: best.box[3] - 3, class: row.best ? "strong" : row.reference ? "label-ref" : "", "data-method": row.method }, text));
 }
 
 function overlap(a, b) {
@@ -74,14 +78,13 @@ function overlap(a, b) {
 function lines(element, series, width, options) {
   const shown = series.filter((one) => one.y.some((value) => value !== null));
   const names = shown.map((one) => one.name);
-  const right = options.labels === false ? 12 : Math.min(Math.max(...names.map(textWidth), 20) + 18, width * 0.4);
+  const right = options.labels === false ? 12 : Math.min(Math.max(...names.map((name) => textWidth(name)), 20) + 18, width * 0.4);
   const height = options.height || Math.max(240, names.length * (options.labels === false ? 0 : 14) + 60);
   const xs = shown.flatMap((one) => one.x), ys = shown.flatMap((one) => [...one.y, ...(one.high || []), ...(one.low || [])]).filter((value) => value !== null);
   const x = options.x || [Math.min(...xs), Math.max(...xs)], y = options.y || [Math.min(0, ...ys), Math.max(...ys, 1) * 1.1];
   const f = frame(width, height, x, y, { ...options, margin: { right, ...options.margin } });
-  const marks = ["circle", "square", "triangle", "diamond"];
   const labels = [];
-  shown.forEach((one, i) => {
+  shown.forEach((one) => {
     const points = one.x.map((value, j) => [f.sx(value), one.y[j] === null ? null : f.sy(one.y[j])]).filter(([, py]) => py !== null);
     const group = svg("g", { class: "m", style: look(one.name), "data-method": one.name });
     if (one.low?.some((value) => value !== null) && one.x.length > 1) {
@@ -91,7 +94,7 @@ function lines(element, series, width, options) {
     const corner = (j) => (options.steps && j ? `${points[j][0].toFixed(1)} ${points[j - 1][1].toFixed(1)}L` : "");
     const d = points.map((p, j) => corner(j) + p.map((v) => v.toFixed(1)).join(" ")).join("L");
     group.append(svg("path", { class: "line", d: `M${d}`, "stroke-dasharray": dash(one.name) }));
-    if (options.marks !== false) for (const [px, py] of points) group.append(marker(marks[i % 4], px, py));
+    if (options.marks !== false) for (const [px, py] of points) group.append(marker(one.name, px, py));
     f.root.append(group);
     const last = points.at(-1);
     if (last && options.labels !== false) labels.push({ name: one.name, at: last, y: last[1], height: 14 });
@@ -102,10 +105,4 @@ function lines(element, series, width, options) {
   }
   element.replaceChildren(f.root);
   return f;
-}
-
-function marker(kind, x, y) {
-  const paths = { square: "M-4-4H4V4H-4Z", triangle: "M0-5L5 4H-5Z", diamond: "M0-5L5 0L0 5L-5 0Z" };
-  if (kind === "circle") return svg("circle", { class: "dot", cx: x, cy: y, r: 4 });
-  return svg("path", { class: "dot", d: paths[kind], transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})` });
 }

@@ -2,9 +2,10 @@
 const DATA = JSON.parse(document.getElementById("data").textContent);
 const METHODS = DATA.methods;
 const themed = [];
+const darkSystem = matchMedia("(prefers-color-scheme: dark)");
+const isDark = () => (document.documentElement.dataset.theme || (darkSystem.matches ? "dark" : "light")) === "dark";
 const all = (selector, root = document) => [...root.querySelectorAll(selector)];
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-const DASHES = ["", "7 3", "2 3", "9 3 2 3", "12 3", "4 2 1 2"];
 
 function svg(name, attributes = {}, text) {
   const element = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -21,8 +22,27 @@ function html(name, attributes = {}, text) {
 }
 
 // The colour of a method as a style; the page's theme lightens it.
-const look = (method) => `--m:${(METHODS[method] || { color: "#777777" }).color}`;
-const dash = (method) => DASHES[(METHODS[method]?.order ?? 0) % DASHES.length];
+const look = (method) => `--m:${METHODS[method]?.color || "{{ colors.GREY }}"}`;
+const dash = (method) => METHODS[method]?.dash || "";
+
+// Shapes of methods around (0, 0), by matplotlib's signs.
+const ring = (count, radii, turn = -90) => `M${Array.from({ length: count }, (_, i) => { const a = ((turn + (i * 360) / count) * Math.PI) / 180, r = radii[i % radii.length]; return `${(r * Math.cos(a)).toFixed(2)} ${(r * Math.sin(a)).toFixed(2)}`; }).join("L")}Z`;
+const PLUS = "M-.35-1H.35V-.35H1V.35H.35V1H-.35V.35H-1V-.35H-.35Z";
+const SHAPES = { s: ring(4, [1.2], 45), "^": ring(3, [1.3]), v: ring(3, [1.3], 90), D: ring(4, [1.25]), P: PLUS, X: PLUS, "*": ring(10, [1.45, 0.62]), p: ring(5, [1.15]), h: ring(6, [1.15]) };
+
+function marker(method, x, y, radius = 4, attributes = {}) {
+  const kind = METHODS[method]?.mark || "o";
+  const place = `translate(${x.toFixed(1)} ${y.toFixed(1)}) scale(${radius})${kind === "X" ? " rotate(45)" : ""}`;
+  const shape = { class: "dot", ...attributes, transform: place, "vector-effect": "non-scaling-stroke" };
+  return kind === "o" ? svg("circle", { ...shape, r: 1 }) : svg("path", { ...shape, d: SHAPES[kind] });
+}
+
+// A method's shape beside its name.
+function swatch(method) {
+  const root = svg("svg", { class: "swatch m", style: look(method), viewBox: "-8 -8 16 16", width: 13, height: 13, "aria-hidden": "true" });
+  root.append(marker(method, 0, 0, 6, { class: `dot${METHODS[method]?.reference ? " hollow" : ""}` }));
+  return root;
+}
 
 function scale(low, high, from, to) {
   const slope = (to - from) / (high - low || 1);

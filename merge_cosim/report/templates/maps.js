@@ -1,9 +1,14 @@
 // Small multiples on canvases: failure maps by both initial speeds, and delays against ambiguity.
-const HEAT = [[255, 247, 205], [254, 217, 118], [253, 160, 70], [240, 80, 45], [190, 10, 40], [100, 0, 40]];
-const heat = (share) => {
-  const place = clamp(share, 0, 1) * (HEAT.length - 1), i = Math.min(Math.floor(place), HEAT.length - 2), part = place - i;
-  return `rgb(${HEAT[i].map((from, k) => Math.round(from + part * (HEAT[i + 1][k] - from)))})`;
+const HEAT = {
+  light: [[255, 247, 205], [254, 217, 118], [253, 160, 70], [240, 80, 45], [190, 10, 40], [100, 0, 40]],
+  dark: [[44, 38, 40], [98, 36, 54], [160, 40, 50], [220, 80, 50], [250, 160, 70], [255, 240, 180]],
 };
+const heats = () => HEAT[isDark() ? "dark" : "light"];
+const heat = (share) => {
+  const steps = heats(), place = clamp(share, 0, 1) * (steps.length - 1), i = Math.min(Math.floor(place), steps.length - 2), part = place - i;
+  return `rgb(${steps[i].map((from, k) => Math.round(from + part * (steps[i + 1][k] - from)))})`;
+};
+const inkOn = (share) => (share > 0.55 === isDark() ? "#222" : "#fff");
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 function panels(element, methods, draw) {
@@ -11,7 +16,9 @@ function panels(element, methods, draw) {
   for (const method of methods) {
     const box = html("div", { class: "map", "data-method": method });
     const canvas = html("canvas", { role: "img" });
-    box.append(html("h3", {}, method), canvas);
+    const heading = html("h3", {}, ` ${method}`);
+    heading.prepend(swatch(method));
+    box.append(heading, canvas);
     element.append(box);
     drawn(box, (width) => draw(method, canvas, width));
     themed.push(() => box.clientWidth > 40 && draw(method, canvas, box.clientWidth));
@@ -58,12 +65,12 @@ function failureMaps(element, map, cases, readout) {
       pen.fillStyle = heat(share(method, i) / top);
       pen.fillRect(Math.floor(x), Math.floor(y), Math.ceil(x + cellWidth) - Math.floor(x), Math.ceil(y + cellHeight) - Math.floor(y));
       if (cellWidth > 34 && cellHeight > 18) {
-        pen.fillStyle = share(method, i) / top > 0.55 ? "#fff" : "#222";
+        pen.fillStyle = inkOn(share(method, i) / top);
         pen.textAlign = "center";
         pen.fillText(`${Math.round(100 * share(method, i))} %`, x + cellWidth / 2, y + cellHeight / 2 + 4);
       }
       if (map.absent[method][i]) {
-        pen.fillStyle = share(method, i) / top > 0.55 ? "#fff" : "#222";
+        pen.fillStyle = inkOn(share(method, i) / top);
         pen.beginPath();
         pen.arc(x + cellWidth / 2, y + (cellHeight > 30 ? cellHeight * 0.82 : cellHeight / 2), Math.max(1, Math.min(cellWidth, cellHeight) / 6, 0), 0, 7);
         if (cellWidth > 34) { pen.beginPath(); pen.arc(x + cellWidth / 2, y + cellHeight * 0.84, 3, 0, 7); }
@@ -73,7 +80,7 @@ function failureMaps(element, map, cases, readout) {
     pen.lineWidth = 2;
     for (const i of recorded.keys()) {
       const [x, y] = at(i), r = Math.max(5, Math.min(cellWidth, cellHeight, 60) / 2 - 1);
-      pen.strokeStyle = "#0072b2";
+      pen.strokeStyle = colour("--link");
       pen.beginPath();
       pen.arc(x + cellWidth / 2, y + cellHeight / 2, r, 0, 7);
       pen.stroke();
@@ -130,7 +137,9 @@ function failureMaps(element, map, cases, readout) {
     });
   }
   const bar = html("p", { class: "scale" });
-  const stripe = html("i", { style: `background:linear-gradient(to right, ${HEAT.map((_, i) => heat(i / (HEAT.length - 1))).join(",")})` });
+  const stripe = html("i"), paint = () => { stripe.style.background = `linear-gradient(to right, ${heats().map((rgb) => `rgb(${rgb})`).join(",")})`; };
+  paint();
+  themed.push(paint);
   if (methods.some((method) => map.failed[method].some(Boolean))) bar.append("0 %", stripe, `${Math.round(1000 * top) / 10} % of the cases failed`);
   else bar.append("No case failed.");
   element.append(bar);

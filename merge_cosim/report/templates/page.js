@@ -1,4 +1,5 @@
 // The page itself: charts in their places, sorting, filter, theme, links to the viewer.
+for (const name of all(".short .name")) name.before(swatch(name.dataset.watch), " ");
 for (const section of all("[data-test]")) {
   const data = DATA.tests[section.dataset.test], place = (name) => section.querySelector(`[data-chart="${name}"]`);
   drawn(place("tradeoff"), (width) => tradeoff(place("tradeoff"), data.rows, width));
@@ -63,10 +64,8 @@ function setTheme(name) {
   document.documentElement.dataset.theme = name;
   for (const redraw of themed) redraw();
 }
-const dark = matchMedia("(prefers-color-scheme: dark)");
-const isDark = () => (document.documentElement.dataset.theme || (dark.matches ? "dark" : "light")) === "dark";
 document.getElementById("theme").addEventListener("click", () => setTheme(isDark() ? "light" : "dark"));
-dark.addEventListener("change", () => { for (const redraw of themed) redraw(); });
+darkSystem.addEventListener("change", () => { for (const redraw of themed) redraw(); });
 const asked = new URLSearchParams(location.search).get("theme");
 if (asked === "dark" || asked === "light") setTheme(asked);
 

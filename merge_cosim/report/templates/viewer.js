@@ -23,7 +23,8 @@ function openViewer(number, method) {
   const one = DATA.cases[number];
   Object.assign(RUN, { case: one, time: 0, playing: false });
   const names = one.runs.map((run) => run.method), rivals = names.filter((name) => !METHODS[name].reference);
-  const failing = one.runs.find((run) => run.failed && rivals.includes(run.method)), passing = one.runs.find((run) => !run.failed && rivals.includes(run.method));
+  const passed = (run) => run.outcome.startsWith("passed"), of = (wanted) => one.runs.find((run) => rivals.includes(run.method) && passed(run) === wanted);
+  const failing = one.runs.find((run) => run.failed && rivals.includes(run.method)) ?? of(false), passing = of(true);
   const first = [method, failing?.method, passing?.method, ...rivals].filter((name) => names.includes(name));
   RUN.shown = [...new Set(first)].slice(0, 2);
   if (!RUN.shown.length) RUN.shown = names.slice(0, 1);
@@ -35,7 +36,7 @@ function openViewer(number, method) {
       RUN.shown = all("input:checked", part("methods")).map((input) => input.value);
       layOut();
     });
-    label.append(box, ` ${run.method} `, html("span", { class: "soft" }, run.outcome));
+    label.append(box, swatch(run.method), ` ${run.method} `, html("span", { class: "soft" }, run.outcome));
     return label;
   }));
   if (!viewer.open) viewer.showModal();
@@ -129,7 +130,7 @@ function drawPlots(runs) {
     if (options.also) for (const run of runs) {
       const records = decode(run), values = options.also(records);
       const d = values.map((value, i) => [records.time[i], value]).filter(([time, value]) => time <= RUN.end && value >= y[0] && value <= y[1]).map(([time, value]) => `${f.sx(time).toFixed(1)} ${f.sy(value).toFixed(1)}`).join("L");
-      if (d) f.root.append(svg("path", { class: "line m", style: `${look(run.method)};stroke-width:1`, d: `M${d}`, "stroke-dasharray": "2 3" }));
+      if (d) f.root.append(svg("path", { class: "line m", style: `${look(run.method)};stroke-width:1`, d: `M${d}`, "stroke-dasharray": "1 3" }));
     }
     const cursor = svg("line", { class: "cursor", y1: f.margin.top, y2: f.height - f.margin.bottom });
     f.root.append(cursor);
@@ -148,7 +149,7 @@ function drawPlots(runs) {
 }
 
 // Expected cost of each policy above the cheapest one's; the driven one is drawn thick.
-const POLICY_COLORS = ["#0072B2", "#56B4E9", "#D55E00", "#CC79A7", "#999933", "#117733", "#332288", "#C6A700", "#882255"];
+const POLICY_COLORS = {{ colors.DISTINCT | tojson }};
 const MOST_COST = 8;
 function policyPlot(run, add) {
   const { time, policy, costs } = decode(run), least = policy.map((_, i) => Math.min(...costs.map((one) => one[i])));

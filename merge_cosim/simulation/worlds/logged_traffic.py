@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from merge_cosim.core.colors import OTHER, RELEASED, rgba
 from merge_cosim.core.units import DT, BoolArray, FloatArray, IntArray
 from merge_cosim.ngsim.pairing.recordings import LoggedScene
 from merge_cosim.ngsim.sites import site as find_site
@@ -16,7 +17,7 @@ from merge_cosim.sumo.logged_road import LoggedRoad, Strip
 from merge_cosim.sumo.session import Session
 from merge_cosim.sumo.vehicle_types import LOGGED_TYPE, ReleasedDrivers
 
-_COLORS = {"logged": (150, 160, 170, 255), "released": (240, 160, 30, 255)}
+_COLORS = {"logged": rgba(OTHER), "released": rgba(RELEASED)}
 
 
 class LoggedTraffic:

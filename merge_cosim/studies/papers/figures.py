@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from merge_cosim.core import colors
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT, IntArray
 from merge_cosim.ngsim.data import load_trajectories
@@ -18,8 +19,7 @@ from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look
 from merge_cosim.studies.papers.evidence import Evidence
 
-ROLES = {"leading car": "#2a9d3a", "host": "#c1121f", "merging car": "#e0a100"}
-"""Colours of Fig. 4 in Lyu, Dong, Dolan 2020."""
+ROLES = {"leading car": colors.GREEN, "host": colors.HOST, "merging car": colors.MERGING}
 MOST_MERGING = 6
 """Merging cars drawn at most."""
 
@@ -33,7 +33,7 @@ def node_figure(evidence: Evidence, looks: Mapping[str, Look]) -> Figure:
             look = looks[str(method)]
             rate = part["failure_pct"].to_numpy(dtype=float)
             low, high = (part[name].to_numpy(dtype=float) for name in ("ci_low_pct", "ci_high_pct"))
-            axes.plot(part["nodes"], rate, look.line, marker="o", ms=3.5, color=look.color, label=method)
+            axes.plot(part["nodes"], rate, look.line, marker=look.mark, ms=3.5, color=look.color, label=method)
             axes.fill_between(part["nodes"], low, high, color=look.color, alpha=0.12, lw=0)
         axes.set(xlabel="speed nodes n", ylabel="failures [%]", ylim=(0.0, None))
         axes.legend()
