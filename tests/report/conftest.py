@@ -1,8 +1,10 @@
 """One small real sweep for all tests of the report, made through the command line."""
 
+import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -50,3 +52,16 @@ def swept(tmp_path_factory: pytest.TempPathFactory, command: Callable[..., int])
     assert command("sweep", scenario, *methods, *vary, "--jobs", 1, "--out", folder / "out") == 0
     assert command("report", folder / "out") == 0
     return folder / "out"
+
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """A Chromium that playwright drives; tests that need it are skipped where either is absent."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("Chromium is not installed")
+    with sync_api.sync_playwright() as playwright:
+        yield playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])

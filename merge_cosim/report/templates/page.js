@@ -1,5 +1,5 @@
 // The page itself: charts in their places, sorting, filter, theme, links to the viewer.
-for (const name of all(".short .name")) name.before(swatch(name.dataset.watch), " ");
+for (const name of all(".short .name")) name.prepend(swatch(name.dataset.watch), " ");
 for (const section of all("[data-test]")) {
   const data = DATA.tests[section.dataset.test], place = (name) => section.querySelector(`[data-chart="${name}"]`);
   drawn(place("tradeoff"), (width) => tradeoff(place("tradeoff"), data.rows, width));

@@ -88,7 +88,10 @@ function drawRoad(runs) {
     root.append(svg("line", { class: "edge", x1: sx(low), x2: sx(high), y1: y - LANE / 2 - 1, y2: y - LANE / 2 - 1 }), svg("line", { class: "edge", x1: sx(0), x2: sx(high), y1: y + LANE / 2 + 1, y2: y + LANE / 2 + 1 }), svg("line", { class: "edge", x1: sx(low), x2: sx(-24), y1: y + LANE / 2 + 1, y2: y + LANE / 2 + 1 }));
     root.append(svg("line", { class: "cursor", x1: sx(0), x2: sx(0), y1: y - 16, y2: y + 26 }));
     for (const run of row) if (!together) root.append(svg("text", { class: "strong", x: 4, y: y - 14 }, `${run.method}: ${run.outcome}`));
-    if (i === rows.length - 1) for (const s of steps) root.append(svg("text", { class: "tick", x: clamp(sx(s), 14, width - 16), y: height - 4, "text-anchor": "middle" }, s === 0 ? "merging point" : `${written(s)} m`));
+    if (i === rows.length - 1) for (const s of steps) {
+      const text = s === 0 ? "merging point" : `${written(s)} m`, half = textWidth(text) / 2;
+      root.append(svg("text", { class: "tick", x: clamp(sx(s), half, width - half), y: height - 4, "text-anchor": "middle" }, text));
+    }
     for (const run of row) {
       const group = svg("g", { class: "m", style: look(run.method), opacity: together && row.length > 1 ? 0.8 : 1 }), length = Math.max(4, sx(CAR) - sx(0));
       const host = svg("rect", { class: "car-host", width: length, height: LANE - 3, rx: 2.5 }), merging = svg("rect", { class: "car-merging", width: length, height: LANE - 3, rx: 2.5 });
