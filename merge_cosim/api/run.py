@@ -19,6 +19,7 @@ from merge_cosim.scenarios.methods import MethodSpec
 from merge_cosim.simulation.worlds.base import WorldKind
 from merge_cosim.sumo.attach import Address
 from merge_cosim.sumo.outputs import SumoOutputs
+from merge_cosim.sweeps.other_cars import other_cars
 from merge_cosim.sweeps.plan import plan, refuse_unsound_ramps
 from merge_cosim.sweeps.single import NO_OUTPUTS, case_alone, trace_case
 from merge_cosim.sweeps.task import Task
@@ -65,6 +66,8 @@ class Run:
 
     def video(self, file: str | Path) -> Path:
         """Write a video in real time: both cars on the ramp from above, belief and decision.
+
+        In a scene the other cars are drawn in grey; the case is run once more for them.
 
         Example:
             >>> run.video("case.gif")  # doctest: +SKIP
@@ -132,7 +135,8 @@ class Run:
             raise UserError(
                 f"{what}: this is a whole scene of living traffic; run one of its encounters (SCENE/HOST/MERGING)"
             )
-        return Film(self.stage, self.trace, "{scenario} {case}, {method}".format(**self.row), outcome(self.row))
+        title = "{scenario} {case}, {method}".format(**self.row)
+        return Film(self.stage, self.trace, title, outcome(self.row), other_cars(self.task, str(self.row["case"])))
 
     def __repr__(self) -> str:
         return "\n".join((*story(self.row), f"({len(self.trace):,} cycles in .trace)"))

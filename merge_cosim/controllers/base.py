@@ -18,11 +18,14 @@ class Controller(Component):
 
     Attributes:
         default_estimator: Estimator of the method that is made of a controller alone.
-        channels: What it can tell of each cycle beside the command, such as the costs of its policies, for traces.
     """
 
     default_estimator: ClassVar[str] = "acc"
-    channels: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of what it can tell of each cycle beside the command, such as the costs of its policies, for traces."""
+        return ()
 
     def taken_from(self, estimator: Estimator) -> dict[str, Any]:
         """Parameters that are the estimator's where the two are paired, by name: they are set there alone."""

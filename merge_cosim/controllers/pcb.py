@@ -65,24 +65,40 @@ class Pcb(IntendedAcceleration, Acc):
             return {}
         return {name: getattr(estimator, name) for name in parameters(IntendedAcceleration)}
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The number of the chosen candidate, and the expected cost of each, which has no unit."""
+        return ("policy", *(f"cost {candidate:+.4g} m/s²" for candidate in self._accelerations()))
+
+    def _accelerations(self) -> FloatArray:
+        return np.arange(self.min_acceleration, self.max_acceleration + TOLERANCE, self.candidate_step)
+
     def start(self, count: int, setting: Setting) -> None:
         """Lay out the candidates."""
         super().start(count, setting)
-        last = self.max_acceleration + TOLERANCE
-        self.candidates = np.arange(self.min_acceleration, last, self.candidate_step)
+        self.candidates = self._accelerations()
+        self._expected, self._planning = np.zeros((len(self.candidates), 0)), np.zeros(0, dtype=np.int64)
+        self._count = count
         self._changes = self.step * self.candidates
         self._comfort = (self.comfort * (self.candidates / self.comfort_scale) ** 2)[:, None]
 
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """The cheapest candidate; acc's law once the merging car is in the lane."""
         planned = np.zeros_like(log_odds)
-        planning = np.flatnonzero(~seen.merging_in_lane)
+        self._planning = planning = np.flatnonzero(~seen.merging_in_lane)
         if len(planning):
             cost = self.costs(Observation(*(getattr(seen, field.name)[planning] for field in fields(Observation))))
             not_yield = 0.5 + 0.5 * np.tanh(0.5 * log_odds[planning])
-            expected = (1.0 - not_yield) * cost[Intention.YIELD] + not_yield * cost[Intention.NOT_YIELD]
-            planned[planning] = self.candidates[expected.argmin(axis=0)]
+            self._expected = (1.0 - not_yield) * cost[Intention.YIELD] + not_yield * cost[Intention.NOT_YIELD]
+            planned[planning] = self.candidates[self._expected.argmin(axis=0)]
         return np.where(seen.merging_in_lane, super().command(seen, log_odds, target), planned)
+
+    def told(self) -> FloatArray:
+        """The number of the driven candidate, and the expected cost of each; NaN where acc's law drives."""
+        told = np.full((1 + len(self.candidates), self._count), np.nan)
+        if len(self._planning):
+            told[:, self._planning] = np.vstack([self._expected.argmin(axis=0), self._expected])
+        return told
 
     def costs(self, seen: Observation) -> FloatArray:
         """Return C_I(a), shape (2, candidates, n), the first axis indexed by `Intention`."""

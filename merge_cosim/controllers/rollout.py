@@ -94,7 +94,6 @@ class Rollout(ReactingDriver, Acc):
 
     name: ClassVar[str] = "rollout"
     default_estimator: ClassVar[str] = "interactive"
-    channels: ClassVar[tuple[str, ...]] = ("policy", *(f"cost_s {name}" for name in POLICIES))
     behind_margin: NonNegativeFloat = 1.2
     steps: Count = 32
     step: PositiveFloat = 0.25
@@ -230,6 +229,11 @@ class Rollout(ReactingDriver, Acc):
             constrain(state, guarded, _LEVELS, self._bounds, command, self.escape_status)
         self._last = command.copy()
         return command
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The number of the chosen policy, and the expected cost of each."""
+        return ("policy", *(f"cost_s {name}" for name in POLICIES))
 
     def told(self) -> FloatArray:
         """The number of the chosen policy in `POLICIES`, and the expected cost of each [s]."""

@@ -1,4 +1,4 @@
-"""One case from above, as stills or as a video: the ramp as it is built, both cars, belief and decision."""
+"""One case from above, as stills or as a video: the ramp as it is built, all cars, belief and decision."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
@@ -37,7 +38,7 @@ BEHIND, AHEAD = 110.0, 70.0
 ROAD_SHARE = 0.56
 """Share of the frame's height that the road takes."""
 CAR_WIDTH = 1.8
-"""Width of both cars [m]; encounters hold lengths only."""
+"""Width of every car [m]; encounters hold lengths only."""
 NAMES_AT = 3.4
 """How far above the host and below the merging car their names stand [m]."""
 
@@ -80,7 +81,9 @@ def check_file(option: str, file: str | Path, kinds: tuple[str, ...]) -> None:
 class Film:
     """The frames of one case."""
 
-    def __init__(self, stage: Stage, record: pd.DataFrame, title: str, outcome: str) -> None:
+    def __init__(
+        self, stage: Stage, record: pd.DataFrame, title: str, outcome: str, others: pd.DataFrame | None = None
+    ) -> None:
         """Make ready to draw.
 
         Args:
@@ -88,6 +91,7 @@ class Film:
             record: One row per cycle.
             title: What stands above every frame.
             outcome: What stands there in the last one.
+            others: Where the other cars are, as `sweeps.other_cars` finds them; None without any.
         """
         self._stage, self._record, self._title, self._outcome = stage, record.reset_index(drop=True), title, outcome
         paths: tuple[Way, Way] = ("main", "ramp") if stage.host == "main" else ("ramp", "main")
@@ -97,6 +101,7 @@ class Film:
             poses(self._road, stage.ramp, path, record[column].to_numpy(dtype=float), length, stage.merge_position)
             for path, column, length in zip(paths, columns, stage.lengths, strict=True)
         ]
+        self._others = {} if others is None else self._bodies_of(others)
         odds = record["log_odds"].to_numpy(dtype=float)
         self._belief = 0.5 + 0.5 * np.tanh(0.5 * odds)
 
@@ -119,6 +124,20 @@ class Film:
         heading = float(place[1][0])
         along = np.array([np.cos(heading), np.sin(heading)])
         return place[0][0], np.stack([along, [-along[1], along[0]]])
+
+    def _bodies_of(self, others: pd.DataFrame) -> dict[int, FloatArray]:
+        """By cycle, the corners of the other cars, shape (cars, 4, 2); those of the first cycle are not known."""
+        heading = others["heading"].to_numpy() - np.arctan2(self._turn[0, 1], self._turn[0, 0])
+        length = others["length_m"].to_numpy()
+        front = (others[["x_m", "y_m"]].to_numpy() - self._origin) @ self._turn.T
+        centre = front - 0.5 * length[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        for name, rows in others.reset_index(drop=True).groupby("lane").groups.items():
+            if name in self._road:  # as the two cars are placed; SUMO's own lanes end before junctions
+                middle = others["pos_m"].to_numpy()[rows] - 0.5 * length[rows]
+                centre[rows] = self._road[str(name)].at(middle)
+        corners = _corners(centre, heading, length)
+        cycles = np.rint(others["time_s"].to_numpy() / DT).astype(int)
+        return {int(cycle): corners[cycles == cycle] for cycle in np.unique(cycles)}
 
     def stills(self, count: int) -> Iterator[Figure]:
         """So many frames, evenly over the case, with the last one."""
@@ -147,6 +166,8 @@ class Film:
         now = self._record.iloc[number]
         cars = [(centres[number], float(headings[number])) for centres, headings in self._cars]
         frame.cars(cars, self._stage.lengths)
+        cycle = round(float(now["time_s"]) / DT)
+        frame.others.set_verts(list(self._others.get(cycle, self._others.get(cycle + 1, ()))))
         last = number == len(self) - 1
         frame.texts["title"].set_text(f"{self._title}{': ' + self._outcome if last else ''}")
         frame.texts["clock"].set_text(f"{now['time_s'] - self._record['time_s'].iloc[0]:5.1f} s")
@@ -178,6 +199,8 @@ class _Frame:
         axes.set_ylim(-half, half)
         axes.axvline(0.0, color=colors.GREY, lw=1.0, ls=":")
         axes.text(0.8, half * 0.86, "merging point", color=colors.GREY, fontsize=8, clip_on=True)
+        self.others = PolyCollection([], facecolor=colors.OTHER, edgecolor=colors.GREY, lw=0.6, zorder=4)
+        axes.add_collection(self.others, autolim=False)
         self._bodies = [
             Polygon(np.zeros((4, 2)), facecolor=color, edgecolor="black", lw=0.8, hatch=hatch, zorder=5)
             for color, hatch in ((colors.HOST, None), (colors.MERGING, "////"))
@@ -185,7 +208,7 @@ class _Frame:
         for body in self._bodies:
             axes.add_patch(body)
         self._names = [
-            axes.text(0, 0, name, ha="center", va=va, fontsize=9, color=color, clip_on=True)
+            axes.text(0, 0, name, ha="center", va=va, fontsize=9, color=color, clip_on=True, zorder=6)
             for name, color, va in (("host", colors.HOST, "bottom"), ("merging car", colors.MERGING, "top"))
         ]
         self.belief = self._bar()
@@ -217,10 +240,17 @@ class _Frame:
         for (centre, heading), length, body, name, side in zip(
             poses, lengths, self._bodies, self._names, (1.0, -1.0), strict=True
         ):
-            along = 0.5 * length * np.array([np.cos(heading), np.sin(heading)])
-            across = 0.5 * CAR_WIDTH * np.array([-np.sin(heading), np.cos(heading)])
-            body.set_xy(centre + np.array([along + across, along - across, -along - across, -along + across]))
+            body.set_xy(_corners(centre[None], np.array([heading]), np.array([length]))[0])
             name.set_position((centre[0], centre[1] + side * NAMES_AT))
+
+
+def _corners(centre: FloatArray, heading: FloatArray, length: FloatArray) -> FloatArray:
+    """Corners of n cars, shape (n, 4, 2)."""
+    along = 0.5 * length[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    across = 0.5 * CAR_WIDTH * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    return np.stack(
+        [centre + one for one in (along + across, along - across, -along - across, -along + across)], axis=1
+    )
 
 
 def _turned(lane: Lanelet, origin: FloatArray, turn: FloatArray) -> Lanelet:

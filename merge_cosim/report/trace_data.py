@@ -24,8 +24,10 @@ QUANTITIES = {
 """What is drawn of each cycle: its column, and the digits that are kept after the point."""
 MOST_CYCLES = 240_000
 """Cycles that a page holds; cases beyond are left to traces.parquet. Some 15 characters each, or 35 with costs."""
-COST = "cost_s "
-"""Columns of the expected costs of a planner's policies [s] begin so; a policy's number is its place among them."""
+COSTS = {"cost_s ": "s", "cost ": ""}
+"""How columns of the expected costs of a planner's policies begin, with their unit; a policy's number is its place."""
+MOST_COST = 10.0
+"""Costs are kept up to this much above the cheapest policy's."""
 
 
 def fitting(recorded: pd.DataFrame) -> tuple[list[tuple[str, str]], int]:
@@ -87,13 +89,17 @@ def _run(records: pd.DataFrame, method: str) -> dict[str, Any]:
     time = records["time_s"].to_numpy(dtype=float)
     step = float(time[1] - time[0]) if len(time) > 1 else 0.1
     run = {"method": method, "start": round(float(time[0]), 3), "step": round(step, 3), "series": series}
-    costs = [name for name in map(str, records) if name.startswith(COST) and records[name].notna().any()]
-    if not costs:
+    begins = [(begin, name) for begin in COSTS for name in map(str, records) if name.startswith(begin)]
+    begin = next((begin for begin, name in begins if records[name].notna().any()), None)
+    if begin is None:
         return run
+    costs = [name for own, name in begins if own == begin and records[name].notna().any()]
     planned = records[records[costs[0]].notna()]  # up to the cycle in which the merging car is in the lane
+    most = planned[costs].min(axis=1) + MOST_COST
     return run | {
-        "policies": [name.removeprefix(COST) for name in costs],
-        "costs": [differences(planned[name], 1) for name in costs],
+        "unit": COSTS[begin],
+        "policies": [name.removeprefix(begin) for name in costs],
+        "costs": [differences(planned[name].clip(upper=most), 1) for name in costs],
         "policy": differences(planned["policy"], 0),
     }
 

@@ -104,6 +104,12 @@ class Configuration:
             if _is_host(one) or one.get("type") in types or (one.tag != "flow" and one.get("id") == host)
         )
 
+    def lengths(self) -> dict[str, float]:
+        """Lengths of the vehicle types that say it [m]."""
+        return {
+            kind.get("id", ""): float(kind.get("length", "")) for kind in self._elements("vType") if kind.get("length")
+        }
+
     def departures(self) -> dict[str, float]:
         """When each vehicle is to depart [s], for those with a time of their own; flows are not in it."""
         found = {}

@@ -9,6 +9,7 @@ from PIL import Image, ImageSequence
 import merge_cosim as mc
 from merge_cosim.report import film
 from merge_cosim.report.film import HELD, Film
+from merge_cosim.sweeps.other_cars import other_cars
 
 CASE = "d+1_h11_m11"
 
@@ -27,6 +28,34 @@ def test_both_fronts_are_at_their_stations(run):
     stations = run.trace.loc[run.trace["merging_station_m"] < -10, "merging_station_m"]
     assert way == pytest.approx(stations.iloc[-1] - stations.iloc[0], abs=0.3)
     assert merging[0, 1] < -3.0  # the ramp comes from the right
+
+
+@pytest.fixture(scope="module")
+def in_scene():
+    how = {"model": "us101-ngsim", "source": "surrogate"}  # the surrogate's own model has seen some of its few cars
+    return mc.run("us101-scene", "surrogate_1-112.1-h106.1", "pgm", **how)
+
+
+def test_the_car_ahead_is_drawn_at_its_gap(in_scene):
+    drawn = in_scene._film("stills")
+    cycle = 40
+    now = in_scene.trace.iloc[cycle]
+    backs = [corners[:, 0].min() for corners in drawn._others[cycle] if abs(corners[:, 1].mean()) < 1.0]
+    ahead = min(back for back in backs if back > now["host_station_m"])
+    assert ahead - now["host_station_m"] == pytest.approx(now["leader_gap_m"], abs=0.2)  # the road bends a little
+    assert len(next(iter(drawn.stills(1))).axes[0].collections[0].get_paths()) == len(drawn._others[1])
+
+
+def test_a_meeting_in_traffic_has_other_cars_with_the_lengths_of_their_types(tmp_path):
+    scene = mc.load_scenario("traffic-light", {"encounters.demand.duration": 120})
+    results = mc.sweep([scene], ["acc"], jobs=1)
+    run = mc.run(scene, results.rows["case"].iloc[0], "acc")
+    others = other_cars(run.task, run.row["case"])
+    host, merging = run.row["case"].split("/")[1:]
+    assert {host, merging}.isdisjoint(others["car"])
+    assert set(others["length_m"]) <= {4.4, 4.7, 5.0, 5.2, 14.0}
+    assert (others.groupby("car")["length_m"].nunique() == 1).all()
+    assert other_cars(mc.run("designed-2", CASE, "acc").task, CASE) is None
 
 
 def test_a_video_has_a_frame_per_cycle_and_holds_the_last(run, tmp_path):

@@ -63,6 +63,24 @@ def test_traces_are_added_to_a_finished_sweep_and_are_those_of_the_case_alone(tm
     pd.testing.assert_frame_equal(own[alone.columns].reset_index(drop=True), alone)
 
 
+def test_the_cheapest_candidate_of_ipcb_is_driven_and_its_costs_are_in_the_page(tmp_path):
+    results = swept(tmp_path / "out", ["ipcb"], traces=1)
+    traces = results.traces
+    names = [name for name in traces if name.startswith("cost ")]
+    assert names[0] == "cost -4 m/s²"
+    assert names[-1] == "cost +2 m/s²"
+    plans = traces["merging_station_m"] < 0
+    assert traces.loc[~plans, names].isna().all(axis=None)
+    chosen = traces.loc[plans, "policy"].to_numpy(dtype=int)
+    np.testing.assert_array_equal(chosen, traces.loc[plans, names].to_numpy().argmin(axis=1))
+    np.testing.assert_allclose(-4 + 0.5 * chosen, traces.loc[plans, "host_acceleration_m_s2"], atol=1e-6)
+    data = json.loads(results.report().read_text(encoding="utf-8").partition('id="data">')[2].partition("</script>")[0])
+    (run,) = data["cases"][0]["runs"]
+    assert run["unit"] == ""
+    assert run["policies"] == [name.removeprefix("cost ") for name in names]
+    np.testing.assert_array_equal(np.cumsum(run["policy"]), chosen)
+
+
 def test_the_cost_of_each_policy_is_recorded_until_the_merging_car_is_in_the_lane(tmp_path):
     results = swept(tmp_path / "out", ["interactive"], traces=1)
     costs = results.traces[[f"cost_s {name}" for name in POLICIES]]

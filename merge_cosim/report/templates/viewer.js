@@ -154,10 +154,11 @@ function drawPlots(runs) {
 // Expected cost of each policy above the cheapest one's; the driven one is drawn thick.
 const POLICY_COLORS = {{ colors.DISTINCT | tojson }};
 const MOST_COST = 8;
+const again = (k) => Math.floor(k / POLICY_COLORS.length) % 2; // the colours come again, dashed
 function policyPlot(run, add) {
   const { time, policy, costs } = decode(run), least = policy.map((_, i) => Math.min(...costs.map((one) => one[i])));
   const above = (i, value) => Math.min(value - least[i], MOST_COST);
-  const drawn = add(`Expected cost of each policy of ${run.method} above the cheapest [s]; thick: driven`, null, { series: [{ name: run.method, x: time.slice(0, policy.length), y: policy.map((_, i) => above(i, costs[policy[i]][i])) }], y: [-0.3, MOST_COST + 0.3], height: 220 });
+  const drawn = add(`Expected cost of each policy of ${run.method} above the cheapest${run.unit && ` [${run.unit}]`}; thick: driven`, null, { series: [{ name: run.method, x: time.slice(0, policy.length), y: policy.map((_, i) => above(i, costs[policy[i]][i])) }], y: [-0.3, MOST_COST + 0.3], height: 220 });
   const driven = drawn.root.querySelector("g .line");
   driven.setAttribute("style", "stroke-width:6;opacity:.45");
   driven.removeAttribute("stroke-dasharray");
@@ -166,8 +167,8 @@ function policyPlot(run, add) {
   for (const { name, k } of used) {
     const style = `stroke:${POLICY_COLORS[k % POLICY_COLORS.length]};stroke-width:1.2`;
     const points = costs[k].map((value, i) => `${drawn.sx(time[i]).toFixed(1)} ${drawn.sy(above(i, value)).toFixed(1)}`).filter((_, i) => time[i] <= RUN.end);
-    if (points.length) drawn.root.append(svg("path", { class: "line", style, d: `M${points.join("L")}`, "stroke-dasharray": k % 3 === 0 ? "none" : k % 3 === 1 ? "6 2" : "2 2" }));
-    key.append(html("span", { style: `color:${POLICY_COLORS[k % POLICY_COLORS.length]};font-weight:700` }, "— "), `${name}  `);
+    if (points.length) drawn.root.append(svg("path", { class: "line", style, d: `M${points.join("L")}`, "stroke-dasharray": again(k) ? "5 3" : "none" }));
+    key.append(html("span", { style: `color:${POLICY_COLORS[k % POLICY_COLORS.length]};font-weight:700` }, again(k) ? "╌ " : "— "), `${written(name)}  `);
   }
   drawn.area.after(key);
 }
