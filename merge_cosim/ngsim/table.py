@@ -69,6 +69,10 @@ class ClockError(ValueError):
     """Global_Time and Frame_ID do not run together."""
 
 
+SIMULATED = "surrogate_"
+"""Names of the surrogate's recordings begin so: its files say themselves that no car was filmed."""
+
+
 def name_recordings(origins: IntArray) -> pa.DictionaryArray:
     """Name each row's recording after its clock origin, in local time rounded to the minute: `2005-06-15T0750`.
 

@@ -35,7 +35,8 @@ def run_command(row: Mapping[Hashable, Any], manifest: Mapping[str, Any]) -> str
         words += ["--world", manifest["world"]]
     if manifest["source"]:
         words += ["--source", manifest["source"]]
-    if row["source"] in ("ngsim", "recorded", TRAFFIC) and command["data"] and find_data(None) != Path(command["data"]):
+    needs_data = row["source"] in ("ngsim", "recorded", "surrogate", TRAFFIC) and manifest["source"] != "surrogate"
+    if needs_data and command["data"] and find_data(None) != Path(command["data"]):
         words += ["--data", command["data"]]
     for name in manifest["plugins"]:
         words += ["--plugin", command.get("plugins", {}).get(name, name)]

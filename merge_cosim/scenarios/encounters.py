@@ -82,6 +82,8 @@ def pairs_of_site(name: str, pairs: Pairs, data: Path | None, source: SourceChoi
     """
     there = site(name)
     real = None if source == "surrogate" or data is None else site_encounters(data, there, pairs.rules)
+    if real is not None and source == "ngsim":
+        real = real.take(np.flatnonzero(real.source != "surrogate"))
     if real is not None and not len(real):
         real = None
     if real is None and source == "ngsim":

@@ -7,6 +7,7 @@ from pathlib import Path
 from merge_cosim.ngsim.pairing.recordings import LoggedScene, episode_scenes, site_scenes
 from merge_cosim.ngsim.sites import site as find_site
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
+from merge_cosim.ngsim.table import SIMULATED
 from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.scenarios.sources import Pairs
 
@@ -17,7 +18,7 @@ def load_scenes(scenario: Scenario, source: str, data: Path | None) -> dict[str,
     Args:
         scenario: The scenario.
         source: The source of its encounters, `ngsim` or `surrogate`.
-        data: Folder with NGSIM files.
+        data: Folder with NGSIM files, or with the surrogate's; None where the surrogate is asked for.
 
     Raises:
         UserError: A file is damaged.
@@ -27,8 +28,10 @@ def load_scenes(scenario: Scenario, source: str, data: Path | None) -> dict[str,
     scenes: dict[str, LoggedScene] = {}
     for name in pairs.sites:
         site = find_site(name)
-        if source == "surrogate":
-            scenes |= site_scenes(surrogate_folder(site), site, pairs.rules)
-        elif data is not None:
-            scenes |= {**episode_scenes(data, site, pairs.rules), **site_scenes(data, site, pairs.rules)}
+        own = {}
+        if data is not None:
+            own = {**episode_scenes(data, site, pairs.rules), **site_scenes(data, site, pairs.rules)}
+        if source == "surrogate" and not any(name.startswith(SIMULATED) for name in own):
+            own = site_scenes(surrogate_folder(site), site, pairs.rules)
+        scenes |= own
     return scenes

@@ -116,4 +116,4 @@ def _sites(data: Path | None) -> dict[SourceChoice, list[str]]:
 
 def _has_pairs(name: str, data: Path) -> bool:
     found = site_encounters(data, find_site(name))
-    return found is not None and len(found) > 0
+    return found is not None and bool((found.source != "surrogate").any())

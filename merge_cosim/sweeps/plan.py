@@ -302,7 +302,8 @@ def _in_scenes(scenario: Scenario, encounters: Encounters, source: str, request:
     if request.world == "closed-form":
         raise _needs_sumo(scenario, "full_scene")
     try:
-        return LoggedCases.of(encounters, scenario.full_scene, load_scenes(scenario, source, request.data))
+        data = None if request.source == "surrogate" else request.data
+        return LoggedCases.of(encounters, scenario.full_scene, load_scenes(scenario, source, data))
     except UserError as error:
         raise UserError(f"scenario {scenario.name}: {error}") from None
 

@@ -23,7 +23,7 @@ from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.stored import read_pairs, write_pairs
 from merge_cosim.ngsim.sites import Site
 
-PAIRS_VERSION = 2
+PAIRS_VERSION = 3
 """Raised when the same trajectories would be paired differently, so that cached pairs are made anew."""
 
 COMPLETE_CARS = 1_000
@@ -53,7 +53,7 @@ def site_pairs(
         data: Folder with trajectory files (or one such file).
         site: The site.
         rules: The thresholds, those that are not set as the site has them; None for the site's.
-        source: What the folder holds; None for the site's own recordings.
+        source: What the folder holds; None for the site's own recordings. The surrogate's tell it themselves.
         episodes_from: First episode to use beside the trajectories; None for the site's.
 
     Raises:

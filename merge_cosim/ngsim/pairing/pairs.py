@@ -14,6 +14,7 @@ from merge_cosim.ngsim.pairing.rules import PairRules, cycles
 from merge_cosim.ngsim.pairing.smoothing import filter_causally
 from merge_cosim.ngsim.pairing.tracks import Tracks, build_tracks, carried_on
 from merge_cosim.ngsim.sites import Site
+from merge_cosim.ngsim.table import SIMULATED
 
 
 @dataclass(frozen=True)
@@ -135,6 +136,11 @@ def _keys(tracks: Tracks, site: Site, cars: IntArray) -> AnyArray:
     return np.array(keys, dtype=object)
 
 
+def _source(recording: str, source: str) -> str:
+    """The surrogate's recordings are called so whatever folder they lie in."""
+    return "surrogate" if recording.startswith(SIMULATED) else source
+
+
 def _encounters(
     tracks: Tracks,
     merging: IntArray,
@@ -160,7 +166,7 @@ def _encounters(
     return Encounters(
         case=_names(tracks, merging, host),
         site=np.full(len(merging), site.name, dtype=object),
-        source=np.full(len(merging), source, dtype=object),
+        source=np.array([_source(tracks.recording[t], source) for t in merging], dtype=object),
         car=_keys(tracks, site, merging),
         host_station=tracks.y[h_start] - origin,
         host_speed=(tracks.y[h_start + 1] - tracks.y[h_start]) / DT,

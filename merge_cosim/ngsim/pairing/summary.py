@@ -132,11 +132,16 @@ def summarise_folder(data: Path, sites: Sequence[Site] = ()) -> list[Summary]:
         raise UserError(f"{data}: no such folder")
     sites = sites or _sites_in(data)
     found = [(each, site_pairs(data, each)) for each in sites]
-    summaries = [summarise(paired, each.name, each.source) for each, paired in found if paired is not None]
+    summaries = [summarise(paired, each.name, _source(paired, each)) for each, paired in found if paired is not None]
     if not summaries:
         names = " or ".join(each.name for each in sites)
         raise UserError(f"{data}: no trajectories of {names} that could make pairs; put their files there")
     return summaries
+
+
+def _source(paired: Paired, site: Site) -> str:
+    """What the pairs say of themselves; the site's own source where there is none."""
+    return " and ".join(dict.fromkeys(paired.encounters.source.tolist())) or site.source
 
 
 def _sites_in(data: Path) -> Sequence[Site]:

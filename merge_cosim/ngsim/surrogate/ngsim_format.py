@@ -15,6 +15,7 @@ from merge_cosim.core.units import DT, FOOT, AnyArray, FloatArray
 from merge_cosim.ngsim.rows import FRAME_MS
 from merge_cosim.ngsim.sites import Site
 from merge_cosim.ngsim.surrogate.recipe import Recipe
+from merge_cosim.ngsim.table import SIMULATED
 from merge_cosim.ramps.ramp import Ramp, read_net
 from merge_cosim.sumo.lane_map import LaneMap
 
@@ -67,7 +68,7 @@ def ngsim_rows(trajectories: Path, recipe: Recipe, ramp: Ramp, site: Site, recor
             "v_Acc": _feet(run["vehicle_acceleration"].to_numpy()),
             "Lane_ID": lane,
             "Location": site.recording.location,
-            "segment": f"surrogate_{recording + 1}",
+            "segment": f"{SIMULATED}{recording + 1}",
         }
     )
     return pa.Table.from_pandas(table.sort_values(["Vehicle_ID", "Frame_ID"]), preserve_index=False)

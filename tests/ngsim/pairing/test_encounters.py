@@ -12,7 +12,10 @@ from merge_cosim.ngsim.pairing.encounters import at_site_point, site_encounters,
 from merge_cosim.ngsim.pairing.pairs import extract_pairs
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.stored import read_pairs, write_pairs
+from merge_cosim.ngsim.pairing.summary import summarise_folder
 from merge_cosim.ngsim.sites import site
+from merge_cosim.scenarios.encounters import pairs_of_site
+from merge_cosim.scenarios.sources import Pairs
 
 US101, I80 = site("us101"), site("i80")
 
@@ -84,6 +87,16 @@ def test_a_surrogate_is_called_one(tmp_path: Path) -> None:
     e = site_encounters(tmp_path, US101, source="surrogate")
     assert e is not None
     assert e.source.tolist() == ["surrogate"]
+
+
+def test_the_surrogate_is_told_from_real_recordings_by_its_file(tmp_path: Path) -> None:
+    pq.write_table(table(*merge_at(30, "a"), *merge_at(40, "surrogate_1")), tmp_path / "both.parquet")
+    e = site_encounters(tmp_path, US101)
+    assert e is not None
+    assert sorted(e.source) == ["ngsim", "surrogate"]
+    assert [one.source for one in summarise_folder(tmp_path)] == ["ngsim and surrogate"]
+    real = pairs_of_site("us101", Pairs(kind="pairs", sites={"us101": "all"}), tmp_path, "ngsim")
+    assert real.source.tolist() == ["ngsim"]
 
 
 def test_nothing_of_a_site(tmp_path: Path) -> None:
