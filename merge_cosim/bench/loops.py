@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -19,6 +17,7 @@ from merge_cosim.controllers.acc import Acc
 from merge_cosim.controllers.law import DistanceKeeping
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import shipped
+from merge_cosim.core.programs import run_program
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.task import Task
@@ -28,6 +27,8 @@ SCENARIO, METHOD = "designed-2", "acc"
 """What is run: the laws of this scenario and method are the ones that the alternatives spell out."""
 ALTERNATIVES = {"scalar": "scalar.py", "restart": "restart.py", "traci": "traci_socket.py"}
 """The alternatives and their scripts in `tools/bench`."""
+LONGEST = 3600.0
+"""Time limit of a script [s]: what it leaves behind, such as SUMO, would be waited for without end."""
 
 
 @dataclass(frozen=True)
@@ -140,9 +141,8 @@ def run_json(command: Sequence[str]) -> Any:
     Raises:
         UserError: It fails; the line is its last one.
     """
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ)
+    done = run_program(command, LONGEST, Path(command[1]))
     if done.returncode:
-        raise UserError(
-            f"bench: {' '.join(command[1:3])} failed: {(done.stderr.strip() or 'no message').splitlines()[-1]}"
-        )
+        message = done.stderr.decode(errors="replace").strip() or "no message"
+        raise UserError(f"bench: {' '.join(command[1:3])} failed: {message.splitlines()[-1]}")
     return json.loads(done.stdout)

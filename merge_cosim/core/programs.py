@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from merge_cosim.core.errors import UserError
@@ -37,7 +38,7 @@ def run_program(
         UserError: It cannot be started, takes too long, or lacks a system library.
     """
     pipe = subprocess.PIPE if captured else None
-    process = None
+    process, ended = None, False
     try:
         with held_back(signal.SIGINT, signal.SIGTERM):  # within Popen they would leave the program behind
             process = subprocess.Popen(
@@ -45,6 +46,7 @@ def run_program(
             )
             _running.add(process)
         output, errors = process.communicate(timeout=seconds)
+        ended = True
     except OSError as error:
         raise UserError(f"{command[0]}: cannot be started ({error.strerror})") from None
     except subprocess.TimeoutExpired:
@@ -52,7 +54,8 @@ def run_program(
         raise UserError(f"{file}: {name} was still at it after {seconds:g} s and was ended; is it damaged?") from None
     finally:
         if process is not None:
-            _end(process)
+            if not ended:
+                _end(process)
             _running.discard(process)
     if process.returncode == NOT_LOADED and (line := missing_library((errors or b"").decode(errors="replace"))):
         raise UserError(line)
@@ -72,11 +75,10 @@ def end_programs() -> None:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a program and its children, which is nothing if it has ended."""
-    if process.poll() is not None:
-        return
+    """End a program and what it has started, which may go on after its own end."""
     if hasattr(os, "killpg"):
-        os.killpg(process.pid, signal.SIGKILL)
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
     else:
         process.kill()
     process.wait()

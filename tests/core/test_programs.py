@@ -54,6 +54,12 @@ def test_a_program_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     assert_ended(tmp_path)
 
 
+def test_what_a_program_leaves_behind_is_ended_too(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="sh was still at it"):
+        run_program(["sh", "-c", "sleep 60 & echo $! $$ > pids.new; mv pids.new pids"], 0.5, tmp_path, cwd=tmp_path)
+    assert_ended(tmp_path)
+
+
 def test_what_it_says_and_its_status(tmp_path: Path) -> None:
     done = run_program(["sh", "-c", "echo out; echo err >&2; exit 3"], 10.0, tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (3, b"out\n", b"err\n")
