@@ -10,6 +10,7 @@ import pandas as pd
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
+from merge_cosim.core.units import AnyArray, BoolArray
 from merge_cosim.results.statistics.paired import sign_flip_p
 
 DEFAULT = "pgm"
@@ -57,8 +58,13 @@ def differing(own: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
         other: Rows of the other.
     """
     pairs = own[~own["censored"]].merge(other[~other["censored"]], on="case", suffixes=("", "_other"))
-    pairs = pairs[pairs["failed"] != pairs["failed_other"]]
-    return pd.DataFrame({"difference": np.where(pairs["failed"], 1, -1), "cluster": clusters_of(pairs)})
+    return disagreement(pairs["failed"].to_numpy(), pairs["failed_other"].to_numpy(), clusters_of(pairs).to_numpy())
+
+
+def disagreement(failed: BoolArray, other_failed: BoolArray, clusters: AnyArray) -> pd.DataFrame:
+    """What `differing` gives, from outcomes of two methods and clusters of the same cases, shape (n,) each."""
+    apart = failed != other_failed
+    return pd.DataFrame({"difference": np.where(failed[apart], 1, -1), "cluster": clusters[apart]})
 
 
 def judged(cases: pd.DataFrame, against: str, is_sample: bool) -> dict[str, Any]:

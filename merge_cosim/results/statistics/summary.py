@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.results.schema import SCHEMA
-from merge_cosim.results.statistics.comparison import differing, judged, not_compared
+from merge_cosim.results.statistics.arrays import RowArrays
+from merge_cosim.results.statistics.comparison import disagreement, judged, not_compared
 from merge_cosim.results.statistics.paired import holm
 from merge_cosim.results.statistics.rates import percent, wilson
 from merge_cosim.results.statistics.totals import Sum, Tail, Totals
@@ -52,6 +54,10 @@ COLUMNS = (
     *dict.fromkeys(column for column, _ in QUANTILES.values() if column != "hardest_braking"),
 )
 """Columns of result rows that a summary is made of."""
+_NUMBERS = tuple(
+    dict.fromkeys((*SUMMED, *(set(COLUMNS) - {*GROUP, "case", "car", "failure_kind", "world"}), "own", "in_sumo"))
+)
+"""Numbers and flags of the rows, and those that are derived from them, which are summed up."""
 D0 = 2.0
 """A host that lets the merging car pass without need kept at least this bumper gap [m] (d0 of the controller)."""
 
@@ -91,8 +97,8 @@ def strata(rows: pd.DataFrame, against: str | None = None) -> pd.DataFrame:
 
 def by_start(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """Part rows by how ambiguous their cases begin."""
-    for name, (low, high) in zip(_starts(), pairwise(AMBIGUITY_EDGES), strict=True):
-        yield name, frame[(frame["ambiguity_s"] >= low) & (frame["ambiguity_s"] < high)]
+    for name, here in _start_masks(frame["ambiguity_s"].to_numpy()):
+        yield name, frame[here]
 
 
 def with_all_sites(frame: pd.DataFrame) -> pd.DataFrame:
@@ -124,20 +130,42 @@ class Summary:
 
     def add(self, rows: pd.DataFrame) -> Self:
         """Take in a batch: all rows of some cases, with the columns `COLUMNS` at least."""
-        frame = rows.assign(unnecessary_yield=_unnecessary_yields(rows))
-        others = dict(iter(frame[frame["method"] == self._against].groupby(SECTION)))
-        for names, group in frame.groupby(GROUP, sort=True):
-            key = tuple(map(str, names))
-            section = key[: len(SECTION)] if key[SECTION.index("source")] != TRAFFIC else ()
-            other = others.get(section, frame.iloc[:0])
-            same_model = other["model"] == key[GROUP.index("model")]
-            other = (other[same_model] if same_model.any() else other).drop_duplicates("case")
-            parts = [] if key[SECTION.index("variation")] else by_start(group)
+        frame = rows.assign(
+            unnecessary_yield=_unnecessary_yields(rows),
+            own=rows["failure_kind"] != "merging_into_host",
+            in_sumo=rows["world"] == "sumo",
+        )
+        arrays = RowArrays.of(frame, _NUMBERS)
+        numbered = frame[GROUP].reset_index(drop=True).groupby(GROUP, sort=True)
+        groups = {tuple(map(str, names)): group.index.to_numpy() for names, group in numbered}
+        for key, places in groups.items():
+            group, other = arrays.take(places), self._other_outcomes(arrays, groups, key)
+            parts = [] if key[SECTION.index("variation")] else _by_start(group)
             for start, part in [(ALL_STARTS, group), *parts]:
                 if len(part):
                     totals = self._groups.setdefault(start, {}).setdefault(key, Totals(self._most))
-                    _take_in(totals, part, other, self._against)
+                    _take_in(totals, part, other, is_sample_source(key[GROUP.index("source")]))
         return self
+
+    def _other_outcomes(
+        self, arrays: RowArrays, groups: Mapping[tuple[str, ...], IntArray], key: tuple[str, ...]
+    ) -> IntArray | None:
+        """Outcomes under the method that a group is compared with, by case; None where there is nothing to compare.
+
+        They are those with the group's own model, if there are such.
+        """
+        section, method, model = key[: len(SECTION)], GROUP.index("method"), GROUP.index("model")
+        if key[method] == self._against or key[SECTION.index("source")] == TRAFFIC:
+            return None
+        others = {
+            other[model]: places
+            for other, places in groups.items()
+            if other[method] == self._against and other[: len(SECTION)] == section
+        }
+        if not others:
+            return None
+        places = others[key[model]] if key[model] in others else np.sort(np.concatenate([*others.values()]))
+        return arrays.take(places).outcomes()
 
     def table(self, cycle_us: Mapping[str, tuple[float, float | None]]) -> pd.DataFrame:
         """See `summarise`."""
@@ -196,59 +224,71 @@ def is_sample_source(source: str) -> bool:
     return source != "designed"
 
 
+def _by_start(rows: RowArrays) -> Iterator[tuple[str, RowArrays]]:
+    for name, here in _start_masks(rows["ambiguity_s"]):
+        yield name, rows.take(here)
+
+
+def _start_masks(ambiguity_s: FloatArray) -> Iterator[tuple[str, BoolArray]]:
+    """Names of the strata, and which cases are in each."""
+    for name, (low, high) in zip(_starts(), pairwise(AMBIGUITY_EDGES), strict=True):
+        yield name, (ambiguity_s >= low) & (ambiguity_s < high)
+
+
 def _starts() -> list[str]:
     return [
         f"[{low:g}, {high:g}) s" if np.isfinite(high) else f">= {low:g} s" for low, high in pairwise(AMBIGUITY_EDGES)
     ]
 
 
-def _take_in(totals: Totals, group: pd.DataFrame, other: pd.DataFrame, against: str | None) -> None:
+def _take_in(totals: Totals, group: RowArrays, other: IntArray | None, sample: bool) -> None:
     """Add the rows of a group to its totals.
 
     Args:
         totals: The totals.
         group: The rows.
-        other: Rows of the method that it is compared with, on the same cases.
-        against: Name of that method.
+        other: Outcome of every case under the method that it is compared with, see `RowArrays.outcomes`.
+        sample: The cases are a sample, so that their clusters are kept.
     """
-    failed, censored = group["failed"], group["censored"]
-    labelled, supported = group["correct_at_merge"].notna(), group["in_support"]
-    own, in_sumo = group["failure_kind"] != "merging_into_host", group["world"] == "sumo"
+    failed, censored = group.flag("failed"), group.flag("censored")
+    labelled, supported = group.known("correct_at_merge"), group.known("in_support")
+    own, in_sumo = group.flag("own"), group.flag("in_sumo")
+    totals.numbers["rows"] += len(group)
     for name, rows in (
-        ("rows", group["case"].notna()),
         ("n", ~censored),
         ("failures", failed & ~censored),
         ("own", own & ~censored),
         ("own_failures", own & failed & ~censored),
-        ("stuck", group["stuck"] & ~censored),
-        ("deadlocks", group["deadlock"].eq(True) & ~censored),
-        ("supported", supported.notna()),
-        ("outside_support", supported.eq(False)),
-        ("extended", group["extended"]),
-        ("host_not_reached", ~group["host_reached"]),
+        ("stuck", group.flag("stuck") & ~censored),
+        ("deadlocks", group.flag("deadlock") & ~censored),
+        ("supported", supported),
+        ("outside_support", supported & ~group.flag("in_support")),
+        ("extended", group.flag("extended")),
+        ("host_not_reached", ~group.flag("host_reached")),
         ("labelled", labelled),
-        ("first_stable", labelled & group["first_stable_s"].notna()),
+        ("first_stable", labelled & group.known("first_stable_s")),
         ("in_sumo", in_sumo),
-        ("sumo_disagrees", in_sumo & (group["sumo_collision"] != failed)),
+        ("sumo_disagrees", in_sumo & (group["sumo_collision"] != group["failed"])),
     ):
         totals.numbers[name] += int(rows.sum())
     for name in SUMMED:
         totals.sums.setdefault(name, Sum()).add(group[name])
-    totals.sums.setdefault("distance_m_safe", Sum()).add(group.loc[~failed, "distance_m"])
-    totals.sums.setdefault("first_stable_s", Sum()).add(group.loc[labelled, "first_stable_s"])
+    totals.sums.setdefault("distance_m_safe", Sum()).add(group["distance_m"][~failed])
+    totals.sums.setdefault("first_stable_s", Sum()).add(group["first_stable_s"][labelled])
     for name, (column, q) in QUANTILES.items():
-        values = group[column].to_numpy(dtype=float, na_value=np.nan)
+        values = group[column]
         totals.tails.setdefault(name, Tail(min(q, 1 - q))).add(values if q < 0.5 else -values, totals.most)
-    if is_sample(group):
-        logged = group["car"] != ""
-        both = pd.DataFrame(
-            {"failed": (100.0 * failed).where(~censored), "distance": group["distance_m"]}, index=group.index
-        )
+    if sample:
+        logged = group.logged
+        both = pd.DataFrame({"failed": np.where(censored, np.nan, 100.0 * failed), "distance": group["distance_m"]})
         totals.logged &= bool(logged.all())
-        totals.clusters.add(both, group["car"] if logged.all() else group["case"], whole=not logged.any())
-    if against is not None and len(other) and not (group["method"] == against).all():
+        names = group.car_names[group.car] if logged.all() else group.case_names[group.case]
+        totals.clusters.add(both, pd.Series(names), whole=not logged.any())
+    if other is not None:
+        against = other[group.case]
+        common = ~censored & (against >= 0)
         totals.compared = True
-        totals.differing.append(differing(group, other))
+        totals.differing.append(disagreement(failed[common], against[common] == 1, group.clusters()[common]))
 
 
 def _summary(key: dict[str, str], totals: Totals, cycle_us: Mapping[str, tuple[float, float | None]]) -> dict[str, Any]:

@@ -20,9 +20,9 @@ class Sum:
     known: int = 0
     total: float = 0.0
 
-    def add(self, values: pd.Series) -> None:
-        """Take in the values of a batch."""
-        present = values.dropna().astype(float)
+    def add(self, values: FloatArray) -> None:
+        """Take in the values of a batch; NaN is not known."""
+        present = values[~np.isnan(values)]
         self.join(Sum(len(present), float(present.sum())))
 
     def join(self, other: Sum) -> None:
