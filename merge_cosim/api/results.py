@@ -305,7 +305,7 @@ def _constant_part(condition: str) -> bool:
     try:
         parts = list(ast.walk(ast.parse(condition.strip(), mode="eval")))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return False  # pandas tells
+        return False  # pandas raises its own error
     pieces: list[list[ast.expr]] = []
     for one in parts:
         if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.Not | ast.Invert):

@@ -146,10 +146,10 @@ class Run:
         from merge_cosim.report.notebook import case_page, frame, pairs_html
 
         first, *others = story(self.row)
-        told = pairs_html([("case", first), *((line[:8].strip(), line[8:]) for line in others)])
+        facts = pairs_html([("case", first), *((line[:8].strip(), line[8:]) for line in others)])
         if "failed" not in self.row or self.trace.empty:
-            return told
-        return told + frame(case_page(self.row, self.trace), "The case, to be watched")
+            return facts
+        return facts + frame(case_page(self.row, self.trace), "The case, to be watched")
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
         return {"text/plain": repr(self), "text/html": self._repr_html_()}

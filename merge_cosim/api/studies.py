@@ -225,7 +225,7 @@ def reproduce(
     from merge_cosim.studies.reproduction import reproduce as run_studies
 
     folder = find_data(None if data is None else Path(data))
-    with sweep_progress(progress) as told:
-        studies = run_studies(folder, Path(out), jobs or os.cpu_count() or 1, seed, told, world)
-        page = write_reproduction(studies, Path(out), told)
+    with sweep_progress(progress) as report:
+        studies = run_studies(folder, Path(out), jobs or os.cpu_count() or 1, seed, report, world)
+        page = write_reproduction(studies, Path(out), report)
     return page, {study.name: Results(Path(out) / study.name) for study in studies}

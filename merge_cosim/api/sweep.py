@@ -37,7 +37,7 @@ def sweep(
     resume: bool = False,
     overwrite: bool = False,
     add: bool = False,
-    traces: Literal["all", "failed", "telling"] | int | None = None,
+    traces: Literal["all", "failed", "disagreeing"] | int | None = None,
     unchecked_ramp: bool = False,
     progress: bool = True,
 ) -> Results:
@@ -73,8 +73,8 @@ def sweep(
         add: Add methods, variations, scenarios or cases to the finished sweep in `out`, of the same settings; its rows
             are then those of one sweep of all. Without `methods`, those that it holds.
         traces: Cases of each scenario that are recorded cycle by cycle, to be watched in the report: `"all"`,
-            `"failed"`, `"telling"` (the methods disagree; up to 200), or a number of them, the most telling first. A
-            few telling ones, if not given. With `add` and nothing else new, traces are added to a finished sweep.
+            `"failed"`, `"disagreeing"` (the methods disagree; up to 200), or a number, those of disagreement
+            first. A few of these, if not given. With `add` and nothing else new, traces are added to a finished sweep.
         unchecked_ramp: Run on a ramp that does not pass `ramp check`, too, which is refused otherwise.
         progress: Show how far the sweep is, on standard error.
 
@@ -103,6 +103,6 @@ def sweep(
         unchecked_ramp=unchecked_ramp,
     )
     results = Results(tempfile.mkdtemp(prefix="merge-cosim-"), temporary=True) if out is None else Results(out)
-    with sweep_progress(progress) as told:
-        run_sweep(request, results.path, resume=resume, overwrite=overwrite, add=add, progress=told)
+    with sweep_progress(progress) as report:
+        run_sweep(request, results.path, resume=resume, overwrite=overwrite, add=add, progress=report)
     return results

@@ -101,7 +101,7 @@ def sweep(
     add: Annotated[bool, typer.Option("--add", help="Add methods, scenarios or cases to the sweep there.")] = False,
     traces: Annotated[
         str | None,
-        typer.Option(metavar="all|failed|telling|N", help="Cases to record for the report's viewer; a few by default."),
+        typer.Option(metavar="all|failed|disagreeing|N", help="Cases to record for the viewer; a few by default."),
     ] = None,
     wide: Wide = False,
     columns: Columns = None,
@@ -332,8 +332,8 @@ def refusal(error: Exception) -> str | None:
         return "not enough memory; try fewer --jobs, or fewer cases"
     from merge_cosim.core.registry import plugin_error
 
-    told = plugin_error(error)
-    return str(told) if told else None
+    line = plugin_error(error)
+    return str(line) if line else None
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ A_SITE = "A site: the name of a shipped ramp, or the path of a folder with site.
 Files = Annotated[list[Path], typer.Argument(metavar="FILE", help="Trajectory files: text, CSV or Parquet.")]
 OptionalSite = Annotated[
     str | None,
-    typer.Option("--site", help=f"{A_SITE}. Only it is kept; it is also the site of a file that does not tell it."),
+    typer.Option("--site", help=f"{A_SITE}. Only it is kept; it is also the site of a file that names none."),
 ]
 Out = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
 

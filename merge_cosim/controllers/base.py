@@ -24,7 +24,7 @@ class Controller(Component):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of what it can tell of each cycle beside the command, such as the costs of its policies, for traces."""
+        """Names of further values that traces record of each cycle, such as the expected costs of the policies."""
         return ()
 
     def taken_from(self, estimator: Estimator) -> dict[str, Any]:
@@ -51,7 +51,7 @@ class Controller(Component):
             target: The merging car is the one to keep distance to, shape (n,).
         """
 
-    def told(self) -> FloatArray:
+    def channel_values(self) -> FloatArray:
         """Values of `channels` in the cycle of the last command, shape (channels, n); NaN where there is none."""
         return np.zeros((0, 0))
 

@@ -93,12 +93,12 @@ class Pcb(IntendedAcceleration, Acc):
             planned[planning] = self.candidates[self._expected.argmin(axis=0)]
         return np.where(seen.merging_in_lane, super().command(seen, log_odds, target), planned)
 
-    def told(self) -> FloatArray:
+    def channel_values(self) -> FloatArray:
         """The number of the driven candidate, and the expected cost of each; NaN where acc's law drives."""
-        told = np.full((1 + len(self.candidates), self._count), np.nan)
+        values = np.full((1 + len(self.candidates), self._count), np.nan)
         if len(self._planning):
-            told[:, self._planning] = np.vstack([self._expected.argmin(axis=0), self._expected])
-        return told
+            values[:, self._planning] = np.vstack([self._expected.argmin(axis=0), self._expected])
+        return values
 
     def costs(self, seen: Observation) -> FloatArray:
         """Return C_I(a), shape (2, candidates, n), the first axis indexed by `Intention`."""

@@ -235,7 +235,7 @@ class Rollout(ReactingDriver, Acc):
         """The number of the chosen policy, and the expected cost of each."""
         return ("policy", *(f"cost_s {name}" for name in POLICIES))
 
-    def told(self) -> FloatArray:
+    def channel_values(self) -> FloatArray:
         """The number of the chosen policy in `POLICIES`, and the expected cost of each [s]."""
         costs = (self.last_costs * self.last_belief[:, None]).sum(axis=2).T
         return np.where(self._plans, np.vstack([self.last_policy, costs]), np.nan)

@@ -1,7 +1,7 @@
 """Every colour that the project draws with: those of Okabe and Ito (2008), some of Tol's (2021), and greys.
 
 Both palettes were chosen so that their colours stay apart under the common kinds of colour blindness. What must be
-told apart without colour is also hatched, dashed, marked by a shape or named.
+distinguished without colour is also hatched, dashed, marked by a shape or named.
 """
 
 BLUE, SKY, GREEN, ORANGE = "#0072B2", "#56B4E9", "#009E73", "#E69F00"

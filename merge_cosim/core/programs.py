@@ -69,7 +69,7 @@ def missing_library(message: str) -> str | None:
 
 
 def end_programs() -> None:
-    """End every program that runs, as when this process is told to end."""
+    """End every program that runs, as when this process is ended by a signal."""
     for process in tuple(_running):
         _end(process)
 

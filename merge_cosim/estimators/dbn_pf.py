@@ -69,7 +69,7 @@ class DbnPf(Estimator):
 
     `P(N) = w_N + w_I [T_m < T_h]`, since a driver that ignores the host keeps the speed, clipped to [1/(2M),
     1 - 1/(2M)]; held between updates. Where a_free meets a constraint, that maneuver drives as IGNORE does, and the two
-    cannot be told apart. Unlike the blog's, the filter lets maneuvers change, as its author asks for. The blog's
+    cannot be distinguished. Unlike the blog's, the filter lets maneuvers change, as its author asks for. The blog's
     sentence that an observed acceleration shifts the particles toward yielding contradicts the sentence before it; here
     it shifts them away.
 

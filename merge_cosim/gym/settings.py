@@ -1,4 +1,4 @@
-"""What an environment can be told: scenario, world, observation, action and reward."""
+"""What an environment can be given: scenario, world, observation, action and reward."""
 
 from __future__ import annotations
 

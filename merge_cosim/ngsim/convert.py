@@ -51,7 +51,7 @@ def convert(files: Sequence[Path], out: Path, wanted: Site | None = None) -> Con
     Args:
         files: Trajectory files of any format.
         out: Folder to write to, made where it is missing.
-        wanted: The only site to keep, and the site of files that do not tell theirs; None keeps every site.
+        wanted: The only site to keep, and the site of files that name none; None keeps every site.
 
     Raises:
         UserError: A file is not trajectory data, is damaged, or has no row of a site that is kept.

@@ -120,7 +120,7 @@ def cached(path: Path, wanted: Site | None = None) -> Reading:
 
     Args:
         path: The file.
-        wanted: The site that is looked for; a shipped one of NGSIM's format is told by the file itself.
+        wanted: The site that is looked for; a shipped one of NGSIM's format is found in the file itself.
     """
     if wanted and wanted.recording.format == "ngsim" and wanted in shipped_sites():
         wanted = None

@@ -22,7 +22,7 @@ TIMEOUT_S = 60.0
 _CHUNK = 1 << 20
 
 Progress = Callable[[int, int | None], None]
-"""Called with the bytes that are there and the bytes of the whole file, None if the server does not tell."""
+"""Called with the bytes that are there and the bytes of the whole file, None if the server does not give it."""
 
 
 def download(folder: Path, url: str = PORTAL, progress: Progress = lambda done, total: None) -> Path:

@@ -94,7 +94,7 @@ class Layout:
         skip_first: Rows left out at the start of each track.
         to_front: Car lengths from the logged point of a car to its front bumper.
         default_length: Length of a car whose length was not logged, for `to_front` [m].
-        smoothed: Positions were smoothed before they were published (where no column tells).
+        smoothed: Positions were smoothed before they were published (where no column says so).
     """
 
     numbers: dict[str, str]
@@ -139,7 +139,7 @@ OWN = Layout({name: name for name in NGSIM.numbers}, recording="recording", unit
 
 @dataclass(frozen=True)
 class Source:
-    """One file, or one member of a zip archive, and what its beginning tells.
+    """One file, or one member of a zip archive, and what its beginning shows.
 
     Attributes:
         path: The file.
@@ -186,7 +186,7 @@ def sources(path: Path, layout: Layout = NGSIM) -> list[Source]:
             magic = file.read(4)
         if magic == _PARQUET:
             columns = tuple(pq.read_schema(path).names)
-            return [_told(Source(path, Kind.OTHER, columns=columns, parquet=True), layout)]
+            return [_with_layout(Source(path, Kind.OTHER, columns=columns, parquet=True), layout)]
         if magic == _ZIP:
             with zipfile.ZipFile(path) as archive:
                 members = [info.filename for info in archive.infolist() if not info.is_dir()]
@@ -226,7 +226,7 @@ def missing_columns(source: Source, layout: Layout) -> list[str]:
 
 
 def _text(path: Path, layout: Layout, member: str = "") -> Source:
-    """Tell a text by its first line."""
+    """Find the format of a text by its first line."""
     with open_text(path, member) as file:
         line = file.readline(_MAX_HEADER)
     source = Source(path, Kind.OTHER, member=member)
@@ -238,14 +238,14 @@ def _text(path: Path, layout: Layout, member: str = "") -> Source:
     blanks = "," not in text
     fields = text.split() if blanks else [field.strip() for field in next(csv.reader([text]))]
     if not all(_is_number(field) for field in fields):
-        return _told(replace(source, columns=tuple(fields), blanks=blanks), layout)
+        return _with_layout(replace(source, columns=tuple(fields), blanks=blanks), layout)
     if len(fields) == len(TEXT_COLUMNS):
         return replace(source, kind=Kind.TRAJECTORIES, columns=TEXT_COLUMNS, header=False, blanks=blanks)
     return replace(source, note=f"it has {len(fields)} columns and no header, NGSIM's text has {len(TEXT_COLUMNS)}")
 
 
-def _told(source: Source, expected: Layout) -> Source:
-    """Tell a file by its columns."""
+def _with_layout(source: Source, expected: Layout) -> Source:
+    """Find the layout of a file by its columns."""
     if _EPISODES.issubset(source.columns):
         return replace(source, kind=Kind.EPISODES)
     if source.find("t_rel") and not source.find("Frame_ID"):

@@ -43,7 +43,7 @@ def read_file(path: Path, assumed: Site | None = None) -> Reading:
 
     Args:
         path: Text, CSV or Parquet; text also packed with gzip or in a zip archive.
-        assumed: The site of a file that does not tell it, or whose own layout the file has.
+        assumed: The site of a file that does not name one, or that has this site's own layout.
 
     Raises:
         UserError: The file holds no trajectories, lacks a column, is damaged or holds an impossible value.

@@ -15,7 +15,7 @@ from merge_cosim.ngsim.sites import Site, shipped_sites
 from merge_cosim.ngsim.table import LATEST_MS, SCHEMA
 
 CLOCK = "Global_Time"
-"""The column [ms since 1970] that tells the recordings apart where the file does not name them."""
+"""The column [ms since 1970] by which recordings are distinguished where the file does not name them."""
 
 FRAME_MS = 100
 """Time from one frame to the next [ms]."""
@@ -67,33 +67,33 @@ def convert(raw: pa.Table, first: int, source: Source, assumed: Site | None) -> 
 
 
 def _site_columns(source: Source, assumed: Site | None) -> list[str]:
-    """The columns that tell the rows' sites; none where the layout is one site's own."""
+    """The columns that give the rows' sites; none where the layout is one site's own."""
     if source.layout.of_site:
         return []
-    told = [name for name in ("Location", "site") if source.find(name)][:1] or ["Global_X", "Global_Y"]
-    if all(map(source.find, told)):
-        return told
+    columns = [name for name in ("Location", "site") if source.find(name)][:1] or ["Global_X", "Global_Y"]
+    if all(map(source.find, columns)):
+        return columns
     if not assumed:
         raise UserError(
-            f"{source}: no column Location, nor Global_X and Global_Y, tells its site: "
+            f"{source}: no column Location, nor Global_X and Global_Y, gives its site: "
             "name it with 'merge-cosim ngsim import --site'"
         )
     return []
 
 
 def _sites(raw: pa.Table, place: Place, assumed: Site | None) -> tuple[list[str], IntArray, Counter[str]]:
-    """Name the sites of a block, tell each row's place among them (-1: none), and count the rows of other sites.
+    """Name the sites of a block, find each row's place among them (-1: none), and count the rows of other sites.
 
     In the canonical layout every site counts; in NGSIM's, the shipped ones and the one that is assumed.
     """
-    source, told = place.source, _site_columns(place.source, assumed)
-    if not told:
+    source, columns = place.source, _site_columns(place.source, assumed)
+    if not columns:
         assert assumed is not None
         return [assumed.name], np.zeros(raw.num_rows, dtype=np.int64), Counter()
     wanted = [*shipped_sites(), *([assumed] if assumed else [])]
-    if len(told) == 1:
+    if len(columns) == 1:
         known = {key.lower(): site.name for site in wanted for key in (site.name, site.recording.location) if key}
-        names = _texts(raw, source.find(told[0]) or "")
+        names = _texts(raw, source.find(columns[0]) or "")
         written = [name.strip() for name in names.dictionary.to_pylist()]
         meant = [known.get(name.lower(), name if source.layout is OWN else "") for name in written]
         found = sorted({name for name in meant if name})
@@ -103,7 +103,7 @@ def _sites(raw: pa.Table, place: Place, assumed: Site | None) -> tuple[list[str]
         codes = np.array([found.index(name) if name else -1 for name in meant], dtype=np.int64)
         return found, codes[row_name], Counter(elsewhere)
     codes = np.full(raw.num_rows, -1)
-    east, north = (numbers(raw[column], column, place) for name in told if (column := source.find(name)))
+    east, north = (numbers(raw[column], column, place) for name in columns if (column := source.find(name)))
     for code, site in enumerate(wanted):
         if site.recording.global_x and site.recording.global_y:
             (west, right), (south, top) = site.recording.global_x, site.recording.global_y
@@ -156,7 +156,7 @@ def _texts(raw: pa.Table, column: str) -> pa.DictionaryArray:
 
 
 def _smoothed(raw: pa.Table, source: Source) -> pa.Array:
-    """Tell which rows come from smoothed positions."""
+    """Which rows come from smoothed positions."""
     if source.layout.of_site:
         return pa.array(np.full(raw.num_rows, source.layout.smoothed))
     if column := source.find("smoothed"):

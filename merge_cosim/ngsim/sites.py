@@ -34,8 +34,8 @@ class Lanes(Table):
         host: The main lane that cars merge into; several numbers where it changes its number along the road.
         ramp: Lanes from which cars merge: on-ramp and auxiliary lane.
         exit: Lanes that go on from those to an off-ramp.
-        shared: Numbers that tell nothing, because they stand for both paths (where two lanes become one) or for no
-            lane: a car keeps the lane that it had before, and counts for the host lane if it had none.
+        shared: Numbers that stand for both paths (where two lanes become one) or for no lane: a car keeps the lane that
+            it had before, and counts for the host lane if it had none.
     """
 
     host: Annotated[_Lanes, Field(min_length=1)]
@@ -152,22 +152,22 @@ class Site(Table):
     @property
     def layout(self) -> Layout:
         """How its files name the canonical columns."""
-        told = self.recording
-        if told.format == "ngsim":
+        recording = self.recording
+        if recording.format == "ngsim":
             return NGSIM
-        numbers = {name: column for name, column in told.columns.items() if name != "recording"}
+        numbers = {name: column for name, column in recording.columns.items() if name != "recording"}
         return Layout(
             numbers,
-            recording=told.columns.get("recording", ""),
-            unit=UNITS[told.unit],
+            recording=recording.columns.get("recording", ""),
+            unit=UNITS[recording.unit],
             limits=WIDE,
             optional=(),
             of_site=True,
-            rate=told.rate,
-            skip_first=told.skip_first,
-            to_front=POINTS[told.point],
+            rate=recording.rate,
+            skip_first=recording.skip_first,
+            to_front=POINTS[recording.point],
             default_length=self.pairs.default_length,
-            smoothed=told.smoothed,
+            smoothed=recording.smoothed,
         )
 
 

@@ -80,7 +80,7 @@ def name_recordings(origins: IntArray) -> pa.DictionaryArray:
         origins: `Global_Time - 100 ms * Frame_ID` [ms since 1970], constant within an original file. Shape (n,).
 
     Raises:
-        ClockError: Origins drift through more than `CLOCK_SPREAD_MS`, so no recording can be told, or are no times.
+        ClockError: Origins drift through more than `CLOCK_SPREAD_MS`, so they separate no recordings, or are no times.
     """
     distinct, row = np.unique(origins, return_inverse=True)
     first = np.concatenate([[True], np.diff(distinct) > CLOCK_SPREAD_MS])
@@ -128,7 +128,7 @@ def _ranks(column: pa.ChunkedArray) -> IntArray:
 
 
 def _same(key: IntArray) -> BoolArray:
-    """Tell the rows that have the value of the row before."""
+    """Which rows have the value of the row before."""
     return np.concatenate([[False], key[1:] == key[:-1]])[: len(key)]
 
 

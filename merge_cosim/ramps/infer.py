@@ -32,7 +32,7 @@ MAX_ANGLE = 45.0
 ANGLE_TOLERANCE = 0.5
 """netconvert rounds coordinates to centimetres, and angles with them [degrees]."""
 LOOK_BACK = 50.0
-"""Beside the last metre of an on-ramp its last part of this length tells at what angle it joins [m]."""
+"""The angle at which an on-ramp joins is measured over its last part of this length, beside its last metre [m]."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ STATES = ["host_station_0_m", "host_speed_0", "merging_station_0_m", "merging_sp
 MEASURES = {"distance_m": "D m", "delay_s": "delay s", "hardest_braking": "brake m/s²"}
 """Measures whose means are set side by side, beside the failures."""
 SIDES = (("a", "A", 2), ("b", "B", 2), ("difference", "A − B", 2), ("interval", "95 % CI", None))
-"""What is told of a measure; the intervals are of the mean of the paired differences, over merging cars."""
+"""What is shown of a measure; the intervals are of the mean of the paired differences, over merging cars."""
 
 
 def compare(first: Path, second: Path, methods: tuple[str, str] | None = None) -> tuple[Table, list[str]]:

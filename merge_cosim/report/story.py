@@ -14,7 +14,7 @@ FAILURES = {
 
 
 def story(row: Mapping[str, Any]) -> list[str]:
-    """Tell a result row, or the facts of a whole scene, in five lines, and one for each broken invariant."""
+    """Describe a result row, or the facts of a whole scene, in five lines, and one for each broken invariant."""
     known = {name: value for name, value in row.items() if value is not None and value == value}
     return _of_pair(known) if "failed" in known else _of_scene(known)
 

@@ -41,7 +41,7 @@ def load_encounters(scenario: Scenario, data: Path | None, source: SourceChoice 
     if isinstance(scenario.encounters, Grid):
         return _grid(scenario.encounters)
     if isinstance(scenario.encounters, Random):
-        return RandomStates.of(scenario.encounters).drawn()
+        return RandomStates.of(scenario.encounters).encounters()
     if isinstance(scenario.encounters, ByArrival):
         encounters = hidden_encounters(scenario.encounters)
         return replace(encounters, label=scenario.merging_car().intentions(encounters))

@@ -48,7 +48,7 @@ class RandomStates:
         order = np.argsort(rows, kind="stable")
         blocks = rows[order] // BLOCK
         parts = [
-            self.part(block * BLOCK, min((block + 1) * BLOCK, len(self))).drawn().take(rows[own] - block * BLOCK)
+            self.part(block * BLOCK, min((block + 1) * BLOCK, len(self))).encounters().take(rows[own] - block * BLOCK)
             for block, own in ((int(one), order[blocks == one]) for one in np.unique(blocks))
         ]
         return Encounters.concatenate(parts).take(np.argsort(order))
@@ -70,7 +70,7 @@ class RandomStates:
         """A short hash of what they are drawn from."""
         return hashlib.sha256(f"{self.states!r} {self.first} {self.last}".encode()).hexdigest()[:16]
 
-    def drawn(self) -> Encounters:
+    def encounters(self) -> Encounters:
         """The cases; each is the same whichever stretch it is drawn in, and however many there are in all."""
         states = self.states
         spans = (states.host_offset, states.host_speed, states.merging_speed)

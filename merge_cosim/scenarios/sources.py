@@ -152,7 +152,7 @@ class Pairs(Strict):
         split: `car`: all pairs of a merging car are on one side; `pair`: as the papers split.
         fraction: Share to train on.
         seed: Seed of the split.
-        merge_point: `car`: station 0 is each logged lane change; `site`: the site's median, which tells an estimator
+        merge_point: `car`: station 0 is each logged lane change; `site`: the site's median, which shows an estimator
             nothing about the future.
         rules: How cars become pairs; what is not set is as the site has it.
     """

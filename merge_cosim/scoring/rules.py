@@ -81,7 +81,7 @@ def expected_cycles(encounters: Encounters, rules: Rules) -> FloatArray:
 
 
 class Watch:
-    """Tells, cycle by cycle, which encounters of a batch are over, in every world."""
+    """Finds, cycle by cycle, which encounters of a batch are over, in every world."""
 
     def __init__(self, count: int, rules: Rules) -> None:
         self._rules = rules

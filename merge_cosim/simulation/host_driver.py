@@ -84,9 +84,9 @@ class DriverBlocks:
             if len(own):
                 block.reset(rows[own] - number * self._size, labels[own], keys[own])
 
-    def told(self) -> FloatArray:
-        """What the controllers tell of the last cycle, shape (their channels, slots); see `Controller.told`."""
-        return np.concatenate([block.controller.told() for block in self._blocks], axis=1)
+    def channel_values(self) -> FloatArray:
+        """See `Controller.channel_values`; shape (channels, slots)."""
+        return np.concatenate([block.controller.channel_values() for block in self._blocks], axis=1)
 
     def rest(self, rows: IntArray) -> None:
         """See `Estimator.rest`."""

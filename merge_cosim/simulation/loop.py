@@ -145,8 +145,8 @@ class Loop:
         if encounters is not None:
             merging_car.start(encounters, world.slots, setting)
         self._driver = DriverBlocks(driver, world.slots, setting)
-        self._told = () if traced == () else driver.controller.channels
-        self._recorder = Recorder(world.slots, rules.time_out_cycles, len(world.channels), len(self._told))
+        self._channels = () if traced == () else driver.controller.channels
+        self._recorder = Recorder(world.slots, rules.time_out_cycles, len(world.channels), len(self._channels))
         self._watch = Watch(world.slots, rules)
         self._age, self._over_at = np.zeros((2, 0), dtype=np.int64)
         self._active, self._open = np.zeros((2, 0), dtype=bool)
@@ -190,8 +190,8 @@ class Loop:
         self._recorder.decided(log_odds, self._speeds[0])
         if world.shown:
             world.show(log_odds)
-        if self._told:
-            self._recorder.tell(self._driver.told())
+        if self._channels:
+            self._recorder.record_channels(self._driver.channel_values())
 
     def after_step(self) -> None:
         """Observe, end what is over and begin what comes next."""
@@ -275,10 +275,10 @@ class Loop:
                 end = end_of(self._recorder.states(track, slot), self._rules)
             track = track[:, : end + 1]
             if case >= 0:
-                self._over[case] = track[: len(track) - len(self._told)]
+                self._over[case] = track[: len(track) - len(self._channels)]
             if name in self._traced:
                 begun_at = 0.0 if ended.begun_at is None else float(ended.begun_at[number])
-                self._traces[name] = trace_of(track, (*self._world.channels, *self._told), begun_at)
+                self._traces[name] = trace_of(track, (*self._world.channels, *self._channels), begun_at)
         self._age[slots] = 0
         if len(self._over) >= SCORED_TOGETHER and not self._found:
             self._score()

@@ -27,14 +27,14 @@ class Recorder:
         lengths: Lengths of hosts and merging cars [m], shape (2, slots).
     """
 
-    def __init__(self, slots: int, longest: int, channels: int = 0, told: int = 0) -> None:
+    def __init__(self, slots: int, longest: int, channels: int = 0, of_controller: int = 0) -> None:
         """Make room for `slots` encounters of at most `longest` cycles.
 
-        Beside the states: `channels` rows of the world, and `told` of the controller.
+        Beside the states: `channels` rows of the world, and `of_controller` of the controller.
         """
         self.lengths = np.ones((2, slots))
-        self._told = RECORDED + channels
-        self._use(np.zeros((longest + 1, self._told + told, slots)))
+        self._of_controller = RECORDED + channels
+        self._use(np.zeros((longest + 1, self._of_controller + of_controller, slots)))
         self._now = 0
 
     def _use(self, cycles: FloatArray) -> None:
@@ -56,22 +56,22 @@ class Recorder:
         now = self._cycles[self._now]
         now[LOG_ODDS], now[COMMAND] = log_odds, command
 
-    def tell(self, told: FloatArray) -> None:
-        """Keep what the controllers tell of the present cycle, shape (told, at least slots)."""
-        now = self._cycles[self._now, self._told :]
-        now[:] = told[:, : now.shape[1]]
+    def record_channels(self, values: FloatArray) -> None:
+        """Keep the controller's channels of the present cycle, shape (channels, at least slots)."""
+        now = self._cycles[self._now, self._of_controller :]
+        now[:] = values[:, : now.shape[1]]
 
     def next_cycle(self) -> tuple[FloatArray, FloatArray]:
         """Go on to the next cycle: where its states and channels are to be written."""
         self._now = (self._now + 1) % len(self._cycles)
         now = self._cycles[self._now]
-        return now[:LOG_ODDS], now[RECORDED : self._told]
+        return now[:LOG_ODDS], now[RECORDED : self._of_controller]
 
     def begun(self, slots: IntArray, start: FloatArray, around: FloatArray) -> None:
         """Begin encounters in the present cycle; the last state of the old ones is overwritten."""
         now = self._cycles[self._now]
         now[:LOG_ODDS, slots] = start[:4].round(DECIMALS)
-        now[RECORDED : self._told, slots] = around
+        now[RECORDED : self._of_controller, slots] = around
         self.lengths[:, slots] = start[4:]
 
     def track(self, slot: int, cycles: int) -> FloatArray:

@@ -24,7 +24,7 @@ MODELS = "models"
 """Folder of the models that are trained on the way."""
 
 Say = Callable[[int, int, str], None]
-"""Told the cases done, the cases in all and what is being run."""
+"""Called with the cases done, all cases and what is being run."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def reproduce(
         out: Folder to write to.
         jobs: Processes.
         seed: Seed of SUMO and of every random stream.
-        say: Told what is going on.
+        say: Called with a line of text before each step.
         world: What moves the cars.
     """
     found = studies(data, out, jobs, seed, say, world)
@@ -70,11 +70,11 @@ def run(found: Sequence[Study], out: Path, say: Say | None = None) -> None:
     """Run studies into folders of their own; a finished one is not run again, an interrupted one goes on."""
     for number, study in enumerate(found, start=1):
 
-        def tell(done: int, total: int, what: str, lead: str = f"{number}/{len(found)} {study.name}") -> None:
+        def of_study(done: int, total: int, what: str, lead: str = f"{number}/{len(found)} {study.name}") -> None:
             if say:
                 say(done, total, f"{lead}: {what}")
 
-        sweep(study.request, out / study.name, resume=True, overwrite=True, progress=tell)
+        sweep(study.request, out / study.name, resume=True, overwrite=True, progress=of_study)
 
 
 def studies(

@@ -32,7 +32,7 @@ class SpeedMode(IntFlag):
 
 
 class LaneChangeMode(IntFlag):
-    """For which reasons SUMO changes lane by itself, and what it heeds when it is told to.
+    """For which reasons SUMO changes lane by itself, and what it takes care of when a command asks for it.
 
     Two bits for each reason: 1 is to change unless a command says otherwise, 2 (not named here) to change even then.
     """

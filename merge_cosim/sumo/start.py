@@ -25,7 +25,7 @@ LONGEST_RUN = 4 * HOUR
 QUIT = "--quit-on-end"
 """Option of sumo-gui: its window closes when the simulation ends."""
 _NO_REASON = "Process Error"
-"""What libsumo raises where it has told the reason elsewhere."""
+"""What libsumo raises where it has printed the reason."""
 
 
 class LibsumoSession(Session):
@@ -49,13 +49,13 @@ class LibsumoSession(Session):
             try:
                 libsumo.start(["sumo", *options.arguments(), *words])
             except errors as error:
-                # Of some mistakes SUMO tells the reason on standard error only.
+                # SUMO prints the reason of some mistakes on standard error only.
                 reason = one_line(error)
                 lines = said().splitlines() if reason == _NO_REASON else []
                 reasons = [line.removeprefix("Error: ") for line in lines if line.startswith("Error: ")]
                 raise UserError(f"{options.file}: SUMO cannot start: {' '.join(reasons) or reason}") from None
-            told = said()
-        sys.stderr.write(told)
+            output = said()
+        sys.stderr.write(output)
         super().__init__(libsumo, errors)
 
 

@@ -173,14 +173,14 @@ class PairCases(Cases):
     @property
     def encounters(self) -> Encounters:
         """See `Cases`."""
-        return self.pairs if isinstance(self.pairs, Encounters) else self.pairs.drawn()
+        return self.pairs if isinstance(self.pairs, Encounters) else self.pairs.encounters()
 
     def __len__(self) -> int:
         return len(self.pairs)
 
     def name(self, number: int) -> str:
         """See `Cases`."""
-        pairs = self.pairs if isinstance(self.pairs, Encounters) else self.pairs.part(number, number + 1).drawn()
+        pairs = self.pairs if isinstance(self.pairs, Encounters) else self.pairs.part(number, number + 1).encounters()
         return str(pairs.case[number if pairs is self.pairs else 0])
 
     def part(self, first: int, last: int) -> Self:
@@ -245,10 +245,10 @@ def refuse_empty(facts: Facts, where: str) -> None:
     """
     if not facts or any(one["meetings"] for one in facts):
         return
-    told: dict[str, str] = {}
+    first: dict[str, str] = {}
     for event, line in facts[0]["notes"]:
-        told.setdefault(event, line)
-    causes = [told[event] for event in _NOTHING if event in told]
+        first.setdefault(event, line)
+    causes = [first[event] for event in _NOTHING if event in first]
     why = "; ".join(causes) or "hosts and merging cars never came near each other"
     raise UserError(f"{where}: nothing to measure: {why}")
 

@@ -65,7 +65,7 @@ class Cluster:
         except ImportError:
             raise UserError("--dask: dask.distributed is not installed; pip install 'merge-cosim[dask]'") from None
         self._distributed: Any = distributed
-        for name in ("distributed", "distributed.client"):  # lost connections are told by us, in one line
+        for name in ("distributed", "distributed.client"):  # we report lost connections, in one line
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
     def run(self, queue: ChunkQueue) -> Generator[Finished]:

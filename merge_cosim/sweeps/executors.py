@@ -100,7 +100,7 @@ class Processes:
         workers: dict[Connection, _Worker] = {}
         try:
             for _ in range(min(self._jobs, len(queue))):
-                self._employ(queue.take(), workers)
+                self._start(queue.take(), workers)
             while busy := [connection for connection, worker in workers.items() if worker.chunk]:
                 for connection in wait(busy):
                     assert isinstance(connection, Connection)
@@ -115,7 +115,7 @@ class Processes:
                         if losses[chunk.name] == MOST_LOSSES:
                             raise UserError(_lost(chunk, worker)) from None
                         worker.stop()
-                        self._employ(chunk, workers)
+                        self._start(chunk, workers)
                         continue
                     if isinstance(outcome, BaseException):
                         raise outcome
@@ -125,14 +125,14 @@ class Processes:
             for worker in workers.values():
                 worker.stop()
 
-    def _employ(self, chunk: Chunk | None, workers: dict[Connection, _Worker]) -> None:
+    def _start(self, chunk: Chunk | None, workers: dict[Connection, _Worker]) -> None:
         worker = _Worker(self._context, self._plugins)
         workers[worker.connection] = worker
         worker.begin(chunk)
 
 
 class _Worker:
-    """A worker process, as its employer sees it."""
+    """A worker process, seen from the process that started it."""
 
     def __init__(self, context: BaseContext, plugins: tuple[Path, ...]) -> None:
         self.connection, there = context.Pipe()
@@ -150,11 +150,11 @@ class _Worker:
         self.chunk = chunk
         if chunk is not None:
             packed = pack(chunk.task())
-            with suppress(OSError):  # it is dead; reading from it will say so
+            with suppress(OSError):  # the process has died; reading from it fails next
                 self.connection.send_bytes(packed)
 
     def stop(self) -> None:
-        """End the process: at once if it is at work, else by its own will."""
+        """End the process: at once if it runs a chunk, else by an empty message, on which it ends itself."""
         if self.chunk is not None:
             self.process.terminate()
         else:
@@ -166,11 +166,11 @@ class _Worker:
 
 @contextmanager
 def interrupts_ignored() -> Iterator[None]:
-    """Processes that begin here do not hear Ctrl-C: their employer decides what it means, and hears it afterwards."""
+    """Processes that are started here ignore Ctrl-C: this process gets it afterwards, and ends them."""
     if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
         yield  # Windows has no masks, and no other thread is interrupted
         return
-    resource_tracker.ensure_running()  # would be started along with the first process, and make it hear again
+    resource_tracker.ensure_running()  # it would be started with the first process, and unblock the signal there
     with held_back(signal.SIGINT):  # for threads without the mask
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
@@ -179,26 +179,26 @@ def interrupts_ignored() -> Iterator[None]:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _serve(employer: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
+def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
     """What a worker process does: run what comes through the pipe, until that is empty or closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the employer decides what an interrupt means
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process gets it, too, and ends the workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if inherited is not None:
-        inherited.close()  # else the worker would never see that the employer has gone
+        inherited.close()  # else the worker would not notice the end of its parent process
     worker_session = WorkerSession()
     try:
         for plugin in plugins:
             load_plugin(plugin)
-        while packed := employer.recv_bytes():
+        while packed := parent.recv_bytes():
             outcome: object
             try:
                 outcome = unpack(packed).run(worker_session)
             except Exception as error:
-                if not isinstance(error, UserError):  # the traceback, say of a user's own file, stays behind
+                if not isinstance(error, UserError):  # pickle leaves the traceback out
                     error.add_note(f"In a worker process:\n{traceback.format_exc()}")
                 outcome = error
-            employer.send_bytes(dumps(outcome))  # an error's class may be one of the user's
-    except (EOFError, OSError):  # the employer was killed
+            parent.send_bytes(dumps(outcome))  # an error's class may be one of the user's
+    except (EOFError, OSError):  # the parent process was killed
         pass
     finally:
         worker_session.close()

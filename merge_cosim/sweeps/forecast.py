@@ -1,4 +1,4 @@
-"""How many runs a sweep is, and about how long it will take: told before it begins."""
+"""How many runs a sweep is, and about how long it will take: printed before it begins."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ CAR_US = 7.5
 PASSAGE_S, USUAL_CARS = 70.0, 50.0
 """Time that a car of generated traffic is on the ramp's net [s], and cars on it where a route file makes them."""
 MINUTE = 60.0
-TELL_S = 10.0
-"""What there is to run is told where it takes about this long [s] or longer."""
+LONG_S = 10.0
+"""What there is to run is printed where it takes about this long [s] or longer."""
 
 
 def seconds(tasks: Sequence[Task], jobs: int) -> float:

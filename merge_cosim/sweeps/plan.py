@@ -85,7 +85,7 @@ class SweepRequest:
     against: str | None = None
     world: WorldKind = "sumo"
     unchecked_ramp: bool = False
-    traces: Literal["all", "failed", "telling"] | int | None = None
+    traces: Literal["all", "failed", "disagreeing"] | int | None = None
 
 
 def plan(request: SweepRequest) -> list[Task]:
@@ -260,7 +260,7 @@ def _encounter_tasks(
 ) -> Iterator[Task]:
     left_out: tuple[str, ...] = ()
     if isinstance(encounters, Encounters) or not _all_on_the_ramp(scenario, encounters):
-        every = encounters if isinstance(encounters, Encounters) else encounters.drawn()
+        every = encounters if isinstance(encounters, Encounters) else encounters.encounters()
         encounters, left_out = _on_the_ramp(scenario, every)
     for source, cases in _by_source(scenario, encounters, request):
         for method in methods_for(cases.part(0, 1).encounters if source == RANDOM else cases.encounters, methods):

@@ -38,7 +38,7 @@ from merge_cosim.sweeps.adding import joined, missing
 from merge_cosim.sweeps.cases import refuse_empty
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
 from merge_cosim.sweeps.executors import executor_for
-from merge_cosim.sweeps.forecast import TELL_S, forecast, seconds
+from merge_cosim.sweeps.forecast import LONG_S, forecast, seconds
 from merge_cosim.sweeps.identity import identity
 from merge_cosim.sweeps.plan import SweepRequest, plan, refuse_unsound_ramps
 from merge_cosim.sweeps.single_timing import time_single_cases
@@ -48,7 +48,7 @@ from merge_cosim.sweeps.traces import record
 __all__ = ["SweepRequest", "plan", "sweep"]
 
 Progress = Callable[[int, int, str], None]
-"""Told the cases done, the cases in all and what is being run; before the first case, what there is to run."""
+"""Called with the cases done, all cases and what is being run; before the first case, with what there is to run."""
 
 
 @dataclass
@@ -98,7 +98,7 @@ def sweep(
         resume: Finish an interrupted sweep; a finished one is left as it is.
         overwrite: Replace what the folder holds; with `resume`, a finished sweep of another request.
         add: Run what the finished sweep in the folder lacks; its own methods, if the request names none.
-        progress: Told how far it is.
+        progress: Called after every chunk.
 
     Raises:
         UserError: See `plan`, `adding.joined` and `ResultFolder.begin`.
@@ -129,7 +129,7 @@ def sweep(
     else:
         folder.begin(what, resume, overwrite)
     planned = perf_counter()
-    if progress and seconds(tasks, request.jobs) >= TELL_S:
+    if progress and seconds(tasks, request.jobs) >= LONG_S:
         progress(0, sum(map(len, tasks)), forecast(tasks, request.jobs))
     tally = _run(request, list(cut(tasks)), folder, progress)
     ran = perf_counter()

@@ -114,8 +114,8 @@ class Task:
                     found_broken.append(checked(run, rows))
                 facts += [{**self.names, **fact} for fact in found]
         except Exception as error:
-            if told := plugin_error(error):
-                raise told from error
+            if line := plugin_error(error):
+                raise line from error
             raise
         if self.recorded:
             return pa.concat_tables(tables), effort

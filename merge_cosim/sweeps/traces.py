@@ -15,17 +15,17 @@ from merge_cosim.results.store import ResultFolder
 from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.sweeps.chunks import ChunkQueue, cut
 from merge_cosim.sweeps.executors import executor_for
-from merge_cosim.sweeps.forecast import TELL_S, duration, seconds
+from merge_cosim.sweeps.forecast import LONG_S, duration, seconds
 from merge_cosim.sweeps.plan import SweepRequest
 from merge_cosim.sweeps.task import Task
 
-Traces: TypeAlias = Literal["all", "failed", "telling"] | int | None
+Traces: TypeAlias = Literal["all", "failed", "disagreeing"] | int | None
 """Cases of each scenario that are recorded: all; those that fail under a method; those on which the methods disagree
-(no more than `MOST_TELLING`); so many, those of disagreement first. None: a few of disagreement, and no living traffic,
-whose scenes would have to be run again."""
-MOST_TELLING = 200
+(no more than `MOST_DISAGREEING`); a number of them, those of disagreement first. None: a few of
+disagreement, and none of living traffic, whose scenes would have to be run again."""
+MOST_DISAGREEING = 200
 A_FEW, ONE_IN = 12, 50
-"""Without a wish: one case, and one more of every `ONE_IN`, but no more than `A_FEW`."""
+"""Where nothing is asked for: one case, and one more of every `ONE_IN`, but no more than `A_FEW`."""
 
 
 COLUMNS = ("method", "failed", "stuck", "distance_m")
@@ -39,11 +39,11 @@ def parse_traces(text: str | int | None) -> Traces:
         UserError: It is none of that.
     """
     match text:
-        case "all" | "failed" | "telling" | None:
+        case "all" | "failed" | "disagreeing" | None:
             return text
     if str(text).isdecimal() and int(str(text)) > 0:
         return int(str(text))
-    raise UserError(f"--traces {text}: give all, failed, telling, or a number of cases")
+    raise UserError(f"--traces {text}: give all, failed, disagreeing, or a number of cases")
 
 
 def record(
@@ -60,23 +60,23 @@ def record(
         tasks: All its tasks.
         folder: The folder.
         earlier: Scenario, case and method of the traces that it holds already and keeps.
-        progress: Told how far it is, where it takes long.
+        progress: Called with the state of the work, where it takes long.
     """
     again = list(_recorded(request.traces, tasks, folder, earlier))
     cost = seconds(again, request.jobs)
-    told = progress if cost >= TELL_S else None
-    how = request if told else replace(request, jobs=1, dask=None)
+    report = progress if cost >= LONG_S else None
+    how = request if report else replace(request, jobs=1, dask=None)
     total, done = sum(map(len, again)), 0
-    if told:
-        told(0, total, f"{total:,} runs to record: about {duration(cost)}")
+    if report:
+        report(0, total, f"{total:,} runs to record: about {duration(cost)}")
     queue = ChunkQueue(cut(again))
     with closing(executor_for(how, len(queue)).run(queue)) as outcomes:
         for chunk, records, effort in outcomes:
             queue.finished(chunk, effort)
             folder.add_records(chunk.name, records)
             done += len(chunk)
-            if told:
-                told(done, total, f"recording {chunk.whole.scenario.name} {chunk.whole.method.name}")
+            if report:
+                report(done, total, f"recording {chunk.whole.scenario.name} {chunk.whole.method.name}")
     folder.write_traces()
 
 
@@ -109,7 +109,7 @@ def _recorded(wanted: Traces, tasks: Sequence[Task], folder: ResultFolder, earli
 
 
 def choose(batches: Iterable[pd.DataFrame], wanted: Traces) -> list[str]:
-    """Names of the cases to record, the most telling first.
+    """Names of the cases to record, those of disagreement first.
 
     First come cases on which the methods disagree in failing or being stuck, evenly or not: one of each set of methods
     that do, then a second of each, and so on; in a set, the case first in which the methods' distances at the host's
@@ -119,7 +119,7 @@ def choose(batches: Iterable[pd.DataFrame], wanted: Traces) -> list[str]:
         batches: Result rows of one scenario, in batches of whole cases: `case` and `COLUMNS`.
         wanted: Which of them.
     """
-    most = wanted if isinstance(wanted, int) else {None: A_FEW, "telling": MOST_TELLING}.get(wanted)
+    most = wanted if isinstance(wanted, int) else {None: A_FEW, "disagreeing": MOST_DISAGREEING}.get(wanted)
     ranked, count = pd.DataFrame(), 0
     for rows in batches:
         found = _by_case(rows)
@@ -131,11 +131,11 @@ def choose(batches: Iterable[pd.DataFrame], wanted: Traces) -> list[str]:
         return []
     ranked["turn"] = ranked.groupby("pattern").cumcount()
     ranked = ranked.sort_values(["agreed", "turn"], kind="stable")
-    telling = ranked[~ranked["agreed"]] if not ranked["agreed"].all() else ranked[:1]
+    disagreeing = ranked[~ranked["agreed"]] if not ranked["agreed"].all() else ranked[:1]
     if wanted is None:
-        chosen = telling[: min(A_FEW, 1 + count // ONE_IN)]
-    elif wanted == "telling":
-        chosen = telling[:most]
+        chosen = disagreeing[: min(A_FEW, 1 + count // ONE_IN)]
+    elif wanted == "disagreeing":
+        chosen = disagreeing[:most]
     else:
         chosen = ranked[ranked["failed"]] if wanted == "failed" else ranked[:most]
     return [str(case) for case in chosen.index]

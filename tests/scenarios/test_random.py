@@ -37,11 +37,11 @@ def test_a_stretch_is_the_same_whatever_it_is_drawn_from():
     source = load_scenario("designed-random", {"encounters.count": 10_000_000}).encounters
     every = RandomStates.of(source)
     late = every.part(9_999_990, 10_000_000)
-    assert late.part(3, 5).drawn().digest == late.drawn().part(3, 5).digest
+    assert late.part(3, 5).encounters().digest == late.encounters().part(3, 5).digest
     rows = np.array([9_999_999, 3, 5_000_000, 4])
     assert every.take(rows).case.tolist() == ["r9999999", "r0000003", "r5000000", "r0000004"]
-    assert every.take(rows).part(0, 1).digest == late.part(9, 10).drawn().digest
-    assert every.part(120, 130).drawn().digest == drawn(count=200).part(120, 130).digest
+    assert every.take(rows).part(0, 1).digest == late.part(9, 10).encounters().digest
+    assert every.part(120, 130).encounters().digest == drawn(count=200).part(120, 130).digest
     assert [every.find("r9999999"), late.find("r9999999"), late.find("r0000001"), every.find("x")] == [
         9999999,
         9,

@@ -1,6 +1,6 @@
 """The logged host against the logged merging car: the logged cars did not collide, so a replay must not either.
 
-It also tells how far each log carries: to the end of scoring, to a lane change that ends it early, or not so far, in
+It also finds how far each log suffices: to the end of scoring, to a lane change that ends it early, or not so far, in
 which case a replay continues the log at constant speed.
 """
 

@@ -53,7 +53,7 @@ def site_pairs(
         data: Folder with trajectory files (or one such file).
         site: The site.
         rules: The thresholds, those that are not set as the site has them; None for the site's.
-        source: What the folder holds; None for the site's own recordings. The surrogate's tell it themselves.
+        source: What the folder holds; None for the site's own recordings. The surrogate's files name it themselves.
         episodes_from: First episode to use beside the trajectories; None for the site's.
 
     Raises:
@@ -94,7 +94,7 @@ def site_encounters(
 def at_site_point(encounters: Encounters) -> Encounters:
     """Move station 0 of every encounter to the median place of its site's merges (each merging car counted once).
 
-    Station 0 at the logged lane change tells an estimator where the driver is going to merge; this variant does not.
+    Station 0 at the logged lane change shows an estimator where the driver is going to merge; this variant does not.
     The cycle of the lane change and the label stay. An encounter that starts with its merging car past that point is
     left out, since nothing is left to decide.
     """

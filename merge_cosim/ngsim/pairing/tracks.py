@@ -100,7 +100,7 @@ def build_tracks(table: pa.Table, site: Site, rules: PairRules, *, everywhere: b
     rows = np.flatnonzero(np.repeat(wanted, lengths))
     starts, lengths = starts[wanted], lengths[wanted]
     offsets = np.append(0, np.cumsum(lengths)).astype(np.int64)
-    lane = _told_lanes(lane[rows], offsets[:-1], site)
+    lane = _lanes_by_path(lane[rows], offsets[:-1], site)
     path = np.where(np.isin(lane, site.side_lanes), site.ramp_lanes[0], lane).astype(np.int64)
     return Tracks(
         recording=np.asarray(recording.dictionary.to_pylist(), dtype=object)[codes[starts]],
@@ -138,7 +138,7 @@ def carried_on(tracks: Tracks, more: int) -> Tracks:
     )
 
 
-def _told_lanes(lane: AnyArray, starts: IntArray, site: Site) -> AnyArray:
+def _lanes_by_path(lane: AnyArray, starts: IntArray, site: Site) -> AnyArray:
     """Give the host lane one number, and a car in a shared lane the lane that it had before (at first the host lane).
 
     Args:

@@ -129,7 +129,7 @@ def _guessed_too_short(net: sumolib.net.Net, link: str | None, speed_limit: floa
     try:
         _, path = choose(net, link, RampNumbers.upstream, RampNumbers.downstream)
     except UserError:
-        return 0  # ramp_from_net tells
+        return 0  # ramp_from_net prints the error
     if not path.beside or GUESSED not in path.beside[0].getEdge().getID():
         return 0
     limit = speed_limit or float(path.main[path.before].getSpeed())

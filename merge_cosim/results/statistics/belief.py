@@ -27,7 +27,7 @@ def belief(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per group, start (all, and by ambiguity) and gate; empty where no case has a label.
 
     `n` cases have a label and pass the gate undecided. A rule without doubt has an accuracy alone; `auc_arrival` is the
-    AUC of T_h - T_m at the same gates of the same runs, and so what the geometry alone tells there.
+    AUC of T_h - T_m at the same gates of the same runs, and so how much the geometry alone decides there.
     """
     found = []
     for key, start, group in _groups(rows):

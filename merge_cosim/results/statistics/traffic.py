@@ -11,7 +11,7 @@ from merge_cosim.results.store import NOTES_CSV, SCENES_CSV, TRAFFIC_CSV
 
 GROUP = ["scenario", "variation", "method", "model"]
 MEANS = ("throughput_veh_h", "mean_speed", "time_loss_s", "cars")
-"""Facts whose mean over scenes is told; all other facts are summed. A fact that a kind of scene lacks is missing."""
+"""Facts whose mean over scenes is given; all other facts are summed. A fact that a kind of scene lacks is missing."""
 
 
 def scene_tables(scenes: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:

@@ -82,7 +82,7 @@ class World(ABC):
         commanded: The hosts are driven by the method, so that they keep within its bounds.
         step_s: Time [s] spent inside the steps of what moves the cars; commanding and reading is not in it.
         vehicle_steps: Cars times steps, where the world counts them; None for the two cars of each encounter.
-        shown: It is shown in a window, which is told what the hosts believe and decide.
+        shown: It is shown in a window, which also shows what the hosts believe and decide.
         worst_difference_m: Largest difference of the stations from the closed form, at an encounter's end [m].
     """
 

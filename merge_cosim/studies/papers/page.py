@@ -83,7 +83,7 @@ def write_reproduction(studies: Sequence[Study], out: Path, say: Say) -> Path:
     Args:
         studies: The finished studies.
         out: Folder of the reproduction.
-        say: Told what is being written.
+        say: Called with a line of text before each part.
 
     Returns:
         The page.
