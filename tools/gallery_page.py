@@ -4,10 +4,11 @@ A picture's source is named in the line before it: `<!-- picture: FILE -->`, or 
 PAGE THEME WIDTH HEIGHT -->`, which needs playwright and a Chromium that is installed.
 """
 
+import contextlib
+import io
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -17,22 +18,43 @@ from blocks import DOCS, page_parser
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
+from merge_cosim.cli.main import main as merge_cosim
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 COMMANDS = re.compile(r"^```\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 PICTURE = re.compile(r"<!-- picture: (?P<source>[^>]+) -->\n!\[[^\]]*\]\((?P<target>[^)]+)\)")
 COARSE = ("encounters.host_speed.step=8", "encounters.merging_speed.step=8", "encounters.host_offset.step=5")
 SHORT = {"designed-2": COARSE, "designed-3": ("encounters.count=40",)}
+"""Settings of the short mode."""
+FEW = "acc,pgm"
+"""Methods of the short mode."""
 
 
 def run_commands(text: str, folder: Path, short: bool) -> None:
     """Run the page's commands, but for those that open a window."""
     for block in COMMANDS.findall(text):
         for line in block.splitlines():
-            words = shlex.split(line, comments=True)[1:]
+            words = shlex.split(line, comments=True)
             if "--gui" in words:
                 continue
-            fewer = SHORT.get(words[1], ()) if short and words[0] == "sweep" else ()
-            command = [sys.executable, "-m", "merge_cosim", *words, *(w for s in fewer for w in ("--set", s))]
-            subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
+            if short and words[1] == "sweep":
+                words[words.index("--method") + 1] = FEW
+                words += ["--jobs", "1"]
+                words += [word for setting in SHORT[words[2]] for word in ("--set", setting)]
+            run_here(words, folder)
+
+
+def run_here(words: list[str], folder: Path) -> None:
+    """Run a command in this process; what it prints is left out."""
+    before, sys.argv = sys.argv, words
+    try:
+        with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()):
+            merge_cosim()
+    except SystemExit as ended:
+        if ended.code:
+            raise
+    finally:
+        sys.argv = before
 
 
 def screenshot(browser: Browser, address: str, theme: str, width: int, height: int, target: Path) -> None:
@@ -49,10 +71,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the commands and place the pictures."""
     given = page_parser(__doc__).parse_args(argv)
     text = (DOCS / "gallery.md").read_text(encoding="utf-8")
-    browsers = map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
     with tempfile.TemporaryDirectory() as made, sync_playwright() as playwright:
         run_commands(text, folder := Path(made), given.short)
-        browser = playwright.chromium.launch(executable_path=next(filter(None, browsers)), args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for picture in PICTURE.finditer(text):
             source, *how = picture["source"].split()
             target = given.docs / picture["target"]

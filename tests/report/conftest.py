@@ -57,7 +57,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory, command: Callable[..., int])
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # playwright runs once at a time in a process
 def browser() -> Iterator[Any]:
     """A Chromium that playwright drives; tests that need it are skipped where either is absent."""
     sync_api = pytest.importorskip("playwright.sync_api")

@@ -12,6 +12,7 @@ import method_pages
 import method_proof
 import models_page
 import pandas as pd
+import pytest
 import ranking_page
 import robustness_page
 import robustness_runs_page
@@ -19,6 +20,7 @@ import scenes_page
 import sensitivity_page
 import surrogate_page
 import traffic_page
+from PIL import Image
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -123,6 +125,20 @@ def test_methods(tmp_path):
     method_pages.main(["--short", "--docs", str(tmp_path)])
     for page in (DOCS / "methods").glob("*.md"):
         assert made_like(tmp_path, f"methods/{page.name}") == page.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_gallery(tmp_path):
+    pytest.importorskip("playwright.sync_api")
+    import gallery_page
+
+    if gallery_page.CHROMIUM is None:
+        pytest.skip("Chromium is not installed")
+    gallery_page.main(["--short", "--docs", str(tmp_path)])
+    text = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    made = {str(file.relative_to(tmp_path)) for file in tmp_path.rglob("*.png")}
+    assert made == {picture["target"] for picture in gallery_page.PICTURE.finditer(text)}
+    assert {Image.open(tmp_path / name).size[0] > 300 for name in made} == {True}
 
 
 def test_kept_aside(tmp_path, data_dir):
