@@ -107,8 +107,11 @@ def new(
     ] = None,
     lane_width: Annotated[float | None, typer.Option(min=2.0, max=10.0, help="Width of every lane [m] (3.6).")] = None,
     left_hand: Annotated[
-        bool, typer.Option("--left-hand", help="Traffic keeps left, which an extract of OpenStreetMap does not say.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--left-hand/--right-hand", help="Side of traffic in an extract (the one on which most links lie)."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Start a ramp of your own: from a few numbers, a SUMO net, or an extract of OpenStreetMap."""
@@ -124,7 +127,7 @@ def new(
         "downstream": downstream,
         "speed_limit": speed_limit,
         "lane_width": lane_width,
-        "left_hand": left_hand or None,
+        "left_hand": left_hand,
     }
     given = {key: value for key, value in numbers.items() if value is not None}
     if not NAME.fullmatch(name):

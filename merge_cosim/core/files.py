@@ -9,6 +9,8 @@ from pathlib import Path
 import platformdirs
 from filelock import FileLock
 
+from merge_cosim.core.errors import UserError
+
 _PACKAGE = Path(__file__).parent.parent
 
 
@@ -24,6 +26,17 @@ def cache_folder(*parts: str) -> Path:
     folder = root.joinpath(*parts)
     folder.mkdir(parents=True, exist_ok=True)
     return folder
+
+
+def without_comma(file: Path) -> str:
+    """A path for an option of SUMO's programs, which take a comma for the end of a file's name.
+
+    Raises:
+        UserError: There is one in it.
+    """
+    if "," in str(file):
+        raise UserError(f"{file}: SUMO takes a comma for the end of a file's name; rename the file or its folder")
+    return str(file)
 
 
 def write_atomically(target: Path, content: bytes) -> None:

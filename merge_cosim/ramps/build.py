@@ -7,6 +7,7 @@ from pathlib import Path
 import sumolib
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import without_comma
 from merge_cosim.core.programs import run_program
 from merge_cosim.core.xml_file import root_element
 from merge_cosim.ramps.definition import read_ramp_file
@@ -58,6 +59,7 @@ def netconvert(file: Path, *options: str) -> None:
     plain = (each for kind in PLAIN for each in file.parent.glob(f"*.{kind}.xml") if file.suffix == ".netccfg")
     for each in filter(Path.is_file, (file, *plain)):
         root_element(each)  # netconvert would follow the entities of a document type
+    without_comma(file)
     command = [sumolib.checkBinary("netconvert"), *options]
     done = run_program(command, LIMIT, file)
     if done.returncode:

@@ -124,6 +124,18 @@ def joint_of(net: sumolib.net.Net, link: str) -> Joint:
     raise UserError(f"edge '{link}' joins no road: it leads to {count} edges after '{last.getID()}'")
 
 
+def links_by_side(net: sumolib.net.Net) -> tuple[int, int]:
+    """How many links join or leave a main road on its left, and how many on its right; crossings do not count."""
+    sides = [0, 0]
+    for link in filter(is_link, net.getEdges()):
+        pairs = [*((link, road) for road in link.getOutgoing()), *((road, link) for road in link.getIncoming())]
+        for edge, onward in pairs:
+            road = onward if edge is link else edge
+            if road.getType().endswith(ROADS) and abs(angle := _deflection(edge, onward)) <= MAX_ANGLE:
+                sides[angle <= 0.0] += 1  # also where a link comes in
+    return sides[0], sides[1]
+
+
 def course(joint: Joint, upstream: float, downstream: float) -> Course:
     """Follow both paths up to the given distances [m] from the gore, or to where the net ends.
 
@@ -193,6 +205,19 @@ def _angle(edge: Edge, onward: Edge) -> float:
     end = edge.getShape()[-1]
     part = math.degrees(math.remainder(ahead - math.atan2(end[1] - far[1], end[0] - far[0]), 2.0 * math.pi))
     return min(angle, abs(part))
+
+
+def _deflection(edge: Edge, onward: Edge) -> float:
+    """Change of direction from the last part of an edge to the first part of another [degrees], left positive."""
+    (x, y), (end_x, end_y) = _last_part(edge.getShape())
+    (far_x, far_y), (next_x, next_y) = _last_part(onward.getShape()[::-1])
+    before, after = math.atan2(end_y - y, end_x - x), math.atan2(far_y - next_y, far_x - next_x)
+    return math.degrees(math.remainder(after - before, 2.0 * math.pi))
+
+
+def _last_part(shape: list[tuple[float, float]]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The last point at least `LOOK_BACK` before a shape's end (else its first), and its end."""
+    return next((p for p in reversed(shape) if math.dist(p, shape[-1]) >= LOOK_BACK), shape[0]), shape[-1]
 
 
 def _lesser_than(through: Edge) -> Callable[[Edge], bool]:

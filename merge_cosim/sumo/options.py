@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from merge_cosim.core.files import without_comma
 from merge_cosim.core.units import DT
 
 Options = Mapping[str, str]
@@ -77,8 +78,8 @@ class SumoOptions:
 
     def arguments(self) -> list[str]:
         """The options as SUMO's command line has them."""
-        source = {"net-file": self.net} if self.configuration is None else {"configuration-file": self.configuration}
-        return [*words({**source, "seed": self.seed, **self.profile}), *self.extra]
+        kind = "net-file" if self.configuration is None else "configuration-file"
+        return [*words({kind: without_comma(self.file), "seed": self.seed, **self.profile}), *self.extra]
 
 
 def words(options: Mapping[str, object]) -> list[str]:

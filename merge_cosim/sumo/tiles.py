@@ -8,7 +8,7 @@ import sumolib
 from lxml import etree
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.files import cache_folder, from_cache, shipped
+from merge_cosim.core.files import cache_folder, from_cache, shipped, without_comma
 from merge_cosim.core.programs import run_program
 from merge_cosim.core.xml_file import read_xml
 from merge_cosim.ramps.ramp import Ramp
@@ -48,7 +48,7 @@ def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
     source = ramp.net.read_bytes()
     ingredients = source + repr((ramp.main, ramp.ramp, count, whole)).encode() + Path(__file__).read_bytes()
     key = hashlib.sha256(ingredients).hexdigest()[:16]
-    target = cache_folder("tiles") / f"{ramp.name}-{count}-{key}.net.xml"
+    target = cache_folder("tiles") / f"{ramp.name.replace(',', '_')}-{count}-{key}.net.xml"
 
     def make(file: Path) -> None:
         net = read_xml(ramp.net, blanks=False)
@@ -68,7 +68,7 @@ def tile_net(ramp: Ramp, count: int, whole: bool = False) -> Path:
 
 def _try(net: Path, named: Path) -> None:
     """Have a SUMO of its own read a net: a net that it cannot bear would end this process without a word."""
-    command = [sumolib.checkBinary("sumo"), "--net-file", str(net), "--no-internal-links", "--end", "0"]
+    command = [sumolib.checkBinary("sumo"), "--net-file", without_comma(net), "--no-internal-links", "--end", "0"]
     done = run_program(command, READING, named)
     if done.returncode:
         lines = [line for line in done.stderr.decode(errors="replace").splitlines() if line.startswith("Error")]

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.files import shipped
+from merge_cosim.core.files import shipped, without_comma
 from merge_cosim.ramps.build import build
 from merge_cosim.ramps.check import check
 from merge_cosim.ramps.definition import FILE_NAME, RampFile
@@ -26,10 +26,11 @@ def require_new(folder: Path) -> None:
     """Refuse a folder that cannot become a new ramp's.
 
     Raises:
-        UserError: The folder exists and is not empty, or its name is no plain word.
+        UserError: The folder exists and is not empty, its name is no plain word, or a comma is in its path.
     """
     if not NAME.fullmatch(folder.name):
         raise UserError(f"{folder}: '{folder.name}' is no name for a ramp; use letters, digits, '-' and '_'")
+    without_comma(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UserError(f"{folder}: exists already; choose another name or folder")
 

@@ -19,6 +19,7 @@ from merge_cosim.ramps.create.folder import require_new
 from merge_cosim.ramps.create.from_net import ramp_from_net
 from merge_cosim.ramps.create.new import RampNumbers
 from merge_cosim.ramps.create.onramp import Origin, choose, read_source, source_root
+from merge_cosim.ramps.infer import links_by_side
 
 KEPT = ("highway.motorway", "highway.motorway_link", "highway.trunk", "highway.trunk_link")
 """Kinds of roads that are read from the extract."""
@@ -51,7 +52,7 @@ def ramp_from_osm(
     speed_limit: float | None = None,
     upstream: float = RampNumbers.upstream,
     downstream: float = RampNumbers.downstream,
-    left_hand: bool = False,
+    left_hand: bool | None = None,
 ) -> Path:
     """Write the stretch around one on-ramp of an extract into a new folder, and build it.
 
@@ -62,7 +63,7 @@ def ramp_from_osm(
         speed_limit: Speed limit of the main road [m/s]; the extract's `maxspeed` if not given.
         upstream: Main road and on-ramp before the gore [m]; what the extract lacks is added straight on.
         downstream: Road after the gore [m]; likewise.
-        left_hand: Traffic keeps left, which the extract does not say.
+        left_hand: Whether traffic keeps left; if not given, it does where most links lie on the left of their roads.
 
     Raises:
         UserError: The file is no OSM XML, or `ramp_from_net` finds no ramp in it.
@@ -77,23 +78,30 @@ def ramp_from_osm(
 
 
 def read_extract(
-    extract: Path, scratch: Path, link: str | None, speed_limit: float | None, left_hand: bool
+    extract: Path, scratch: Path, link: str | None, speed_limit: float | None, left_hand: bool | None
 ) -> tuple[Path, Origin]:
     """Make a net of an extract in a scratch folder; an acceleration lane that is guessed suits the speed limit."""
     readable, advised = _with_advisory_speed(extract, scratch)
     net_file = scratch / "extract.net.xml"
     _convert(extract, readable, net_file, left_hand)
     net = read_source(net_file, extract)
+    left, right = links_by_side(net)
+    side = None
+    if left_hand is None and left > right:
+        side = f"Traffic keeps left: {left} of {left + right} links lie on the left of their roads."
+        left_hand = True
+        _convert(extract, readable, net_file, left_hand)
+        net = read_source(net_file, extract)
     if length := _guessed_too_short(net, link, speed_limit):
         _convert(extract, readable, net_file, left_hand, "--ramps.ramp-length", str(length))
         net = read_source(net_file, extract)
     edges = net.getEdges()
     unlimited = [edge.getID() for edge in edges if "speed" in edge.getParam("osmDefaults", "").split()]
     at_advisory_speed = [edge.getID() for edge in edges if WAY.sub("", edge.getID()) in advised]
-    return net_file, Origin(extract, GUESSED, unlimited, at_advisory_speed)
+    return net_file, Origin(extract, GUESSED, unlimited, at_advisory_speed, side)
 
 
-def _convert(extract: Path, readable: Path, net_file: Path, left_hand: bool, *more: str) -> None:
+def _convert(extract: Path, readable: Path, net_file: Path, left_hand: bool | None, *more: str) -> None:
     """Make a net of an extract; error lines speak of `extract`, netconvert reads `readable`."""
     types = Path(sumo.SUMO_HOME) / "data" / "typemap" / "osmNetconvert.typ.xml"
     files = ("--osm-files", str(readable), "--type-files", str(types), "--output-file", str(net_file))

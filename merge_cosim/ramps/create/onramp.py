@@ -26,12 +26,14 @@ class Origin:
         guessed: Parts of edge ids that netconvert gives where it guesses an acceleration lane.
         unlimited: Edges without a speed limit in the file, whose lanes have a stand-in's.
         advised: Edges that the file says to have no speed limit, whose lanes have the advisory speed.
+        side: Why traffic keeps left, in words, where the file does not say it.
     """
 
     file: Path
     guessed: str | None = None
     unlimited: Collection[str] = ()
     advised: Collection[str] = ()
+    side: str | None = None
 
 
 def source_root(file: Path) -> etree._Element:
@@ -121,6 +123,8 @@ def sources_of(
         "merging_point": merging_point_source(length, limit),
         "speed_limit": f"{file}: lane {gore.getID()}.",
     }
+    if origin.side:
+        sources["side"] = origin.side
     if path.beside:
         sources["acceleration_lane"] = f"{file}: lane {path.beside[-1].getID()} {path.ending}."
         if origin.guessed and origin.guessed in path.beside[0].getEdge().getID():

@@ -12,6 +12,7 @@ from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
 
 FOR_FILES = ("upstream", "downstream", "speed_limit", "left_hand")
 """Numbers that may be given beside a file."""
+_SIDE = "ramp new: --left-hand and --right-hand are for --from-osm"
 
 
 def start_ramp(
@@ -35,11 +36,11 @@ def start_ramp(
         if link is not None:
             raise UserError("ramp new: --link names an edge of a file; give --from-net or --from-osm, too")
         if "left_hand" in numbers:
-            raise UserError("ramp new: --left-hand is for --from-osm; mirror a straight ramp to see it from the left")
+            raise UserError(f"{_SIDE}; mirror a straight ramp to see it from the left")
         return new_ramp(folder, RampNumbers(**numbers)), []
     for key in numbers:
         if key == "left_hand" and net is not None:
-            raise UserError("ramp new: --left-hand is for --from-osm; a SUMO net says itself on which side it drives")
+            raise UserError(f"{_SIDE}; a SUMO net says itself on which side it drives")
         if key not in FOR_FILES:
             raise UserError(f"ramp new: --{key.replace('_', '-')} comes from the file; leave it out")
     if net is not None:

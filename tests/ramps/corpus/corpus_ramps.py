@@ -261,7 +261,6 @@ OSM = [
         "1 2 3",
         "9",
         1,
-        left_hand=True,
     ),
     osm(
         "left-hand traffic, exit after",
@@ -273,7 +272,6 @@ OSM = [
         "1 2 3",
         "9",
         1,
-        left_hand=True,
     ),
     osm("one lane", {**main(0, 250, lanes=(1, 2, 1)), 9: RAMP}, "1 2 3", "9", 0),
     osm("five lanes", {**main(0, 250, lanes=(5, 6, 5)), 9: RAMP}, "1 2 3", "9", 4),

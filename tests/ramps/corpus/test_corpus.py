@@ -28,7 +28,7 @@ def test_the_paths_are_the_right_ones(tmp_path: Path, case: Case) -> None:
     file = case.make(tmp_path)
     link, plain = numbers.get("link"), list
     if case in OSM:
-        file, _ = read_extract(file, tmp_path, link, None, numbers.get("left_hand", False))
+        file, _ = read_extract(file, tmp_path, link, None, numbers.get("left_hand"))
         plain = ways
     _, path = choose(read_source(file, file), link, 700.0, 1500.0)
     edges = [lane.getEdge().getID() for lane in path.main]

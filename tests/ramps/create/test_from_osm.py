@@ -3,10 +3,12 @@
 import gzip
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
 import sumolib
+from command import refused
 from typer.testing import CliRunner
 
 from merge_cosim.cli.ramp import app
@@ -109,3 +111,25 @@ def test_options_that_do_not_go_together(tmp_path: Path, words: list[str], messa
     result = CliRunner().invoke(app, ["new", "mine", "--out", str(tmp_path), *words])
     assert isinstance(result.exception, UserError)
     assert message in str(result.exception)
+
+
+def test_the_side_of_traffic_is_read_from_the_links_or_given(tmp_path: Path) -> None:
+    mirrored = re.sub(r'lat="48\.(\d+)"', lambda m: f'lat="{96.4 - float(f"48.{m[1]}"):.7f}"', TEXT)
+    extract = write(tmp_path, mirrored)
+    ramp = Ramp.load(ramp_from_osm(tmp_path / "mine", extract))
+    assert ramp.auxiliary_end == pytest.approx(240.0, abs=2.0)
+    said = "Traffic keeps left: 1 of 1 links lie on the left of their roads."
+    assert read_ramp_file(tmp_path / "mine").sources["side"] == said
+    assert "side" not in read_ramp_file(ramp_from_osm(tmp_path / "plain", EXTRACT)).sources
+    line = refused("ramp", "new", "other", "--right-hand", cwd=tmp_path)
+    assert "--left-hand and --right-hand are for --from-osm" in line
+
+
+def test_a_comma_in_a_path_that_sumo_would_split(tmp_path: Path) -> None:
+    place = tmp_path / "a,b"
+    place.mkdir()
+    extract = write(place, TEXT)
+    assert "a,b/extract.osm: SUMO takes a comma for the end" in refused(
+        "ramp", "new", "x", "--from-osm", extract, cwd=tmp_path
+    )
+    assert "a,b/x: SUMO takes a comma for the end" in refused("ramp", "new", "x", "--out", place, cwd=tmp_path)
