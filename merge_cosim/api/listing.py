@@ -26,7 +26,10 @@ def list_scenarios() -> pd.DataFrame:
     """The shipped scenarios: name, title, ramp, what the test is."""
     every = [load_scenario(name) for name in scenario_names()]
     return pd.DataFrame(
-        [{"scenario": one.name, "title": one.title, "ramp": one.ramp, "about": one.about.strip()} for one in every]
+        [
+            {"scenario": one.name, "title": one.title, "ramp": one.ramp, "about": " ".join(one.about.split())}
+            for one in every
+        ]
     )
 
 

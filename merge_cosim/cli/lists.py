@@ -1,4 +1,4 @@
-"""`merge-cosim methods`, `scenarios` and `cache`: lists."""
+"""`merge-cosim methods`, `scenarios`, `models`, `sensors`, `worlds` and `cache`: lists."""
 
 from textwrap import wrap
 from typing import Annotated, Any
@@ -22,7 +22,7 @@ def methods(
     plugin: Plugins = None,
     json: Json = False,
 ) -> None:
-    """List estimators, controllers, merging cars and sensors, or describe the parameters of one."""
+    """List what methods are made of, or describe a part or a method."""
     from merge_cosim.scenarios.catalogue import component, components
 
     if name is not None:
@@ -36,22 +36,52 @@ def methods(
     if json:
         print_json(rows)
     else:
-        show_table(
-            [{k: v for k, v in row.items() if k != "parameters"} | {"parameters": _listed(row)} for row in rows], ""
-        )
+        show_table([{k: v for k, v in row.items() if k != "parameters"} for row in rows], "")
+        typer.echo("merge-cosim methods NAME describes one, with its parameters.")
 
 
 @app.command()
-def scenarios(json: Json = False) -> None:
-    """List the shipped scenarios."""
+def sensors(json: Json = False) -> None:
+    """List how a host can see the merging car."""
+    from merge_cosim.scenarios.catalogue import components
+
+    rows = [row for row in components() if row["role"] == "sensor"]
+    if json:
+        print_json(rows)
+    else:
+        show_table([{"sensor": row["name"], "about": row["about"]} for row in rows], "")
+
+
+@app.command()
+def scenarios(
+    name: Annotated[str | None, typer.Argument(help="Scenario to describe, or its file.")] = None, json: Json = False
+) -> None:
+    """List the shipped scenarios, or describe one."""
     from merge_cosim.scenarios.scenario import load_scenario, scenario_names
 
-    rows = [load_scenario(name) for name in scenario_names()]
-    listed = [{"scenario": one.name, "title": one.title, "ramp": one.ramp, "about": one.about.strip()} for one in rows]
+    rows = [load_scenario(one) for one in ([name] if name else scenario_names())]
+    about = {one.name: " ".join(one.about.split()) for one in rows}
+    listed = [{"scenario": one.name, "title": one.title, "ramp": one.ramp, "about": about[one.name]} for one in rows]
     if json:
         print_json(listed)
+    elif name:
+        typer.echo(f"{rows[0].name}: {rows[0].title}, on the ramp {rows[0].ramp}\n")
+        typer.echo("\n".join(wrap(about[rows[0].name], WIDTH, break_on_hyphens=False)))
     else:
-        show_table(listed, "")
+        show_table([{key: row[key] for key in ("scenario", "ramp", "title")} for row in listed], "")
+        typer.echo("merge-cosim scenarios NAME describes one.")
+
+
+@app.command()
+def models(json: Json = False) -> None:
+    """List the learned models that come with the project (--model)."""
+    from merge_cosim.api.listing import list_models
+
+    rows = list_models().to_dict("records")
+    if json:
+        print_json(rows)
+    else:
+        show_table([{str(key).replace("train_", ""): value for key, value in row.items()} for row in rows], "")
 
 
 @app.command()
@@ -86,11 +116,6 @@ def cache(clear: Annotated[bool, typer.Option("--clear", help="Delete it.")] = F
         print_json({"folder": str(folder), "cleared": clear, "parts": rows})
     else:
         show_table(rows, f"{folder}{' (cleared)' if clear else ''}")
-
-
-def _listed(row: dict[str, object]) -> str:
-    values = row["parameters"]
-    return ", ".join(f"{key}={value}" for key, value in values.items()) if isinstance(values, dict) else ""
 
 
 def _description(part: dict[str, Any]) -> str:

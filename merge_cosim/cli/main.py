@@ -32,7 +32,15 @@ from merge_cosim.cli.options import (
     methods_like,
     scenarios_like,
 )
-from merge_cosim.cli.show import die, print_json, show_results, show_table, show_verification, verification
+from merge_cosim.cli.show import (
+    die,
+    print_json,
+    show_results,
+    show_story,
+    show_table,
+    show_verification,
+    verification,
+)
 from merge_cosim.core.errors import UserError
 
 app = typer.Typer(
@@ -237,7 +245,7 @@ def run(
     if json:
         print_json(done.row)
     else:
-        typer.echo("\n".join(story(done.row)))
+        show_story(story(done.row))
     if video is not None:
         done.video(video)
     if stills is not None:
@@ -260,7 +268,9 @@ def export(
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Write one case as ordinary SUMO files: net, route file and .sumocfg, to be changed and run by SUMO or by us.
+    """Write one case as SUMO files, or as a CommonRoad scenario.
+
+    Net, route file and .sumocfg can be changed, and run by SUMO or by merge-cosim.
 
     With --commonroad: run the case and write it as a CommonRoad scenario, with the host as its planning problem.
     """
@@ -298,7 +308,9 @@ def train(
     everything: Annotated[bool, typer.Option("--all", help="Train on all pairs, none is left to judge.")] = False,
     json: Json = False,
 ) -> None:
-    """Learn speed transitions, times to arrival and the prior from one third of a site's pairs, and judge the rest.
+    """Learn a model from recorded cars, and judge it on others.
+
+    Speed transitions, times to arrival and the prior are counted from one third of a site's pairs.
 
     With --splits or --folds several models go into a folder, for `sweep --model FOLDER`.
     """

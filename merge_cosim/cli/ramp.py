@@ -8,9 +8,7 @@ import typer
 from merge_cosim.cli.options import Json
 from merge_cosim.cli.show import print_json
 
-app = typer.Typer(
-    help="List, check, build and edit ramps: folders with ramp.toml and a SUMO net.", no_args_is_help=True
-)
+app = typer.Typer(help="List, check, build and edit ramps.", no_args_is_help=True)
 
 Which = Annotated[str, typer.Argument(metavar="NAME|DIR", help="A shipped ramp's name or a ramp's folder.")]
 

@@ -41,7 +41,10 @@ def report(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Make one offline HTML page of a sweep: verdict, tables, failure maps, recorded cases; or figures for a paper."""
+    """Make one offline HTML page of a sweep, or figures for a paper.
+
+    The page has the verdict, tables, failure maps and recorded cases.
+    """
     from merge_cosim.api.results import Results
 
     results = Results(folder)
@@ -89,7 +92,10 @@ def compare(
     wide: Wide = False,
     json: Json = False,
 ) -> None:
-    """Set two sweeps, or two methods of any folders, side by side, on the cases that both hold."""
+    """Set two methods, or two sweeps, side by side.
+
+    They may be of any folders; what both hold is compared.
+    """
     from merge_cosim.report.comparison import compare as compare_folders
     from merge_cosim.report.export import write_tables
     from merge_cosim.report.short_table import compared_tables
@@ -132,7 +138,10 @@ def cases(
     limit: Annotated[int, typer.Option(min=0, help="Most cases to list; 0, or --json: all.")] = 20,
     json: Json = False,
 ) -> None:
-    """List cases, each as the command that runs it: --where "failed and method == 'pgm'", or --fails pgm --not acc."""
+    """List cases, each as the command that runs it.
+
+    Such as --where "failed and method == 'pgm'", or --fails pgm --not acc.
+    """
     from merge_cosim.api.results import load_results
 
     results = load_results(folder)
@@ -164,7 +173,10 @@ def verify(
     jobs: Jobs = None,
     json: Json = False,
 ) -> None:
-    """Run a share of a sweep's rows again in SUMO and compare; exit status 1 if they differ beyond the tolerance."""
+    """Run a share of a sweep's rows again in SUMO and compare.
+
+    The exit status is 1 if they differ beyond the tolerance.
+    """
     from merge_cosim.api.results import Results
 
     found = Results(folder).verify(
@@ -187,7 +199,10 @@ def reproduce(
     world: World = "sumo",
     json: Json = False,
 ) -> None:
-    """Run every table and figure of the papers, ours beside theirs, into one HTML page; a second call goes on."""
+    """Make every table and figure of the papers, ours beside theirs.
+
+    One HTML page holds them; a second call goes on where the first ended.
+    """
     from merge_cosim.api.studies import reproduce as run_studies
     from merge_cosim.cli.interrupts import resumable
 
@@ -208,7 +223,7 @@ def bounds(
     out: Annotated[Path | None, typer.Option(help="Write one row per case to this .csv file.")] = None,
     json: Json = False,
 ) -> None:
-    """Bound what any host could have done: the cases without a way, and the smallest delays."""
+    """Bound what any host could have done: failures and delays."""
     from merge_cosim.api.studies import bounds as bounds_of
     from merge_cosim.scenarios.settings import parse_setting
 
@@ -246,7 +261,7 @@ def bench(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Time the loop, its alternatives, other simulators, every estimator, living traffic, and whole sweeps."""
+    """Time the loop, other simulators, estimators and whole sweeps."""
     from merge_cosim.bench import bench as figures
     from merge_cosim.bench import regression
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -53,11 +55,12 @@ def _exact(value: Any) -> Any:
 
 def show_table(rows: Sequence[Mapping[str, Any]], title: str) -> None:
     """Print rows as a table; columns without any value are left out."""
+    from rich.box import HORIZONTALS
     from rich.console import Console
     from rich.table import Table
 
     columns = [name for name in (rows[0] if rows else {}) if any(row[name] not in (None, "") for row in rows)]
-    table = Table(title=title or None, title_justify="left", header_style="bold")
+    table = Table(title=title or None, title_justify="left", box=HORIZONTALS)
     for name in columns:
         table.add_column(
             name, justify="left" if any(isinstance(row[name], str) for row in rows) else "right", overflow="fold"
@@ -66,7 +69,7 @@ def show_table(rows: Sequence[Mapping[str, Any]], title: str) -> None:
         table.add_row(*(_text(row[name]) for name in columns))
     console = Console()
     if not console.is_terminal:
-        console = Console(width=max(120, 16 * len(columns)))
+        console.width = max(console.width, 16 * len(columns))
     console.print(table)
 
 
@@ -85,6 +88,13 @@ def show_short_table(table: ShortTable) -> None:
     from merge_cosim.report.text_table import print_short_table
 
     print_short_table(table, Console())
+
+
+def show_story(lines: Sequence[str]) -> None:
+    """Print what happened in a case; a line that is too long for the terminal goes on below its own text."""
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    for line in lines:
+        print("\n".join(textwrap.wrap(line, width, subsequent_indent=" " * 8, break_on_hyphens=False)))
 
 
 def _text(value: Any) -> str:

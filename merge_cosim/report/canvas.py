@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -13,6 +12,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from merge_cosim.core import colors
+from merge_cosim.report.methods import broken
 
 WIDTH, HEIGHT = 5.4, 3.4
 """Size of a single panel [in]: half a page's width on a desk, all of it on a phone."""
@@ -102,16 +102,6 @@ def grid_of(
     for above in axes[max(count - across, 0) : count]:
         above.tick_params(labelbottom=True)
     return figure, axes[:count]
-
-
-def broken(name: str, most: int = 16) -> str:
-    """A long name in several lines, parted behind its dashes and pluses."""
-    lines = [""]
-    for piece in re.split(r"(?<=[-+_])", name):
-        if lines[-1] and len(lines[-1]) + len(piece) > most:
-            lines.append("")
-        lines[-1] += piece
-    return "\n".join(lines)
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str], **options: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -90,6 +91,16 @@ def looks(methods: Iterable[str]) -> Mapping[str, Look]:
         elif method not in KNOWN:
             chosen[method] = _free(_family(method), chosen.values())
     return chosen
+
+
+def broken(name: str, most: int = 16) -> str:
+    """A long name in several lines, parted behind its dashes and pluses."""
+    lines = [""]
+    for piece in re.split(r"(?<=[-+_])", name):
+        if lines[-1] and len(lines[-1]) + len(piece) > most:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(lines)
 
 
 def _free(family: str | None, taken: Iterable[Look]) -> Look:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from merge_cosim.core import colors
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.report import canvas
-from merge_cosim.report.methods import Look, in_order
+from merge_cosim.report.methods import Look, broken, in_order
 from merge_cosim.results.statistics.summary import ALL_SITES, AMBIGUITY_EDGES
 
 CELL, ALONE = (1.8, 1.9), (4.2, 3.4)
@@ -91,7 +91,7 @@ def failure_map(results: pd.DataFrame) -> Figure:
             image = ax.pcolormesh(*edges, 100 * part, vmin=0, vmax=100 * top, cmap="YlOrRd", linewidth=0)
             row, column = np.nonzero(shares.absent[method])
             ax.scatter(shares.mergings[column], shares.hosts[row], s=1.2, color=colors.INK, linewidths=0)
-            ax.set_title(canvas.broken(method))
+            ax.set_title(broken(method))
             ax.grid(False)
             ax.set_aspect("auto")
         figure.supxlabel("merging car's initial speed [m/s]", fontsize="medium")
@@ -119,7 +119,7 @@ def ambiguity_figure(results: pd.DataFrame, looks: Mapping[str, Look]) -> Figure
             ax.scatter(x[failed], y[failed], s=26, marker="x", color=colors.FAILED, linewidths=1.3, zorder=4)
             for edge in AMBIGUITY_EDGES[1:-1]:
                 ax.axvline(edge, color=colors.SILVER, lw=0.8, zorder=0)
-            ax.set_title(canvas.broken(method))
+            ax.set_title(broken(method))
         axes[0].set_xlim(0.0, right * 1.04)
         axes[0].set_ylim(top=top * 1.06)
         figure.supxlabel("$|T_m - T_h|$ at the start [s]", fontsize="medium")

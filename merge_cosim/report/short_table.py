@@ -174,12 +174,20 @@ def _beside(row: Mapping[Hashable, Any], columns: Sequence[Column]) -> ShortTabl
     text = {column.name: column.text(row[column.name]) for column in columns}
     cells = [[heading, *(text.get(f"{name}_{side}", "") for side, *_ in SIDES)] for name, heading in LINES.items()]
     cells.insert(1, ["failed under this one only", text["only_a"], text["only_b"], "", ""])
-    said = (
-        f"Failures of the same cases (exact test, a car's cases kept together): p = {text['p']}.".replace("= <", "< ")
-        if "p" in text
-        else ""
-    )
-    return ShortTable(f"{', '.join(names)}: {text['n']} common cases", sides, cells, len(cells), frozenset(), said)
+    only_a, only_b = (int(row[f"only_{side}"]) for side in "ab")
+    if only_a == only_b:
+        said = "Both fail in as many cases" + ("; in the same ones." if not only_a else f"; {only_a:,} in each alone.")
+    else:
+        (few, less), (many, more) = sorted(((only_a, "A"), (only_b, "B")))
+        cases = f"{many:,} case{'s' * (many > 1)}"
+        said = f"{less} fails less: {cases} under {more} alone, {few or 'none'} under {less} alone."
+    if "p" in text:
+        test = f"Exact test, a car's cases kept together: p = {text['p']}.".replace("= <", "< ")
+        said = f"{said} {test}"
+    used = [place for place in range(len(sides)) if any(cells_of[place] for cells_of in cells)]
+    shown = [[line[place] for place in used] for line in cells]
+    title = f"{', '.join(names)}: {text['n']} common cases"
+    return ShortTable(title, tuple(sides[place] for place in used), shown, len(cells), frozenset(), said)
 
 
 def _several_models(summary: pd.DataFrame) -> pd.Series:

@@ -30,11 +30,21 @@ def test_the_cache_is_shown_and_cleared(tmp_path):
     assert not made.exists()
 
 
-def test_the_table_of_methods_holds_their_parameters():
-    done = runner.invoke(lists.app, ["methods"], env={"COLUMNS": "400"})
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [
+        (["methods"], ("estimator", "controller", "merging car", "sensor", "oracle-best", "late-accelerating")),
+        (["sensors"], ("radar", "perfect")),
+        (["models"], ("us101-ngsim-all", "us101-surrogate")),
+        (["scenarios"], ("shifted-margins-short", "US-101 replay")),
+        (["scenarios", "designed-2"], ("Designed Test II, on the ramp designed", "11 x 25 x 25 =")),
+    ],
+)
+def test_a_list_fits_80_columns(words, shown):
+    done = runner.invoke(lists.app, words, env={"COLUMNS": "80"})
     assert done.exit_code == 0
-    for shown in ("estimator", "controller", "merging car", "sensor", "headway=1.5", "oracle-best"):
-        assert shown in done.stdout
+    assert [text for text in shown if text not in done.stdout] == []
+    assert max(map(len, done.stdout.splitlines())) <= 80
 
 
 def test_every_shared_option_has_a_help_text():

@@ -161,7 +161,7 @@ def test_teleports_and_contacts_of_others_are_told_and_counted(tmp_path: Path, r
         lines = [note["what"] for note in notes if note["event"] == event]
         assert any(what in line for line in lines), (event, lines)
         assert int(float(traffic[event])) == len(lines)
-        assert f"{event}: {len(lines)}, such as: " in done.stderr
+        assert f"{event.replace('_', ' ')}: {len(lines)}, such as: " in done.stderr
 
 
 def test_a_configuration_without_a_described_net_infers_its_ramp_and_says_so(tmp_path: Path) -> None:

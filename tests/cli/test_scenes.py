@@ -76,7 +76,7 @@ def test_events_are_told_in_one_line_each_and_listed(minute):
     notes = table(out / "notes.csv")
     two_hosts = [note for note in notes if note["event"] == "two_hosts"]
     assert two_hosts
-    assert f"two_hosts: {len(two_hosts)}, such as: merging car" in done.stderr
+    assert f"two hosts: {len(two_hosts)}, such as: merging car" in done.stderr
     counted = sum(int(one["two_hosts"]) for one in table(out / "scenes.csv"))
     assert counted == len(two_hosts)
 
@@ -206,7 +206,7 @@ def test_vehicles_that_sumo_leaves_out_of_an_unsorted_file_are_counted(tmp_path)
     cars = [car("h1", 5, "main_in"), car("m1", 6, "ramp"), car("late", 1, "main_in"), car("m2", 2, "ramp")]
     own_files(tmp_path, HEAD + "".join(cars) + "</routes>", '<end value="60"/>')
     _, done = swept(tmp_path, "my.sumocfg", "--method", "acc")
-    assert "vehicles_not_departed: 2, such as: vehicle late never departed: SUMO left it out" in done.stderr
+    assert "vehicles not departed: 2, such as: vehicle late never departed: SUMO left it out" in done.stderr
     (tmp_path / "my.rou.xml").write_text(HEAD + "".join(cars[2:] + cars[:2]) + "</routes>")
     _, done = swept(tmp_path, "my.sumocfg", "--method", "acc", out="sorted")
     assert "not_departed" not in done.stderr

@@ -112,6 +112,7 @@ def test_any_two_methods_are_compared_on_their_common_cases(sampled):
     printed = merge_cosim("compare", "a:pgm", "b:fg", cwd=folder).stdout
     assert printed.startswith("A: a, pgm; B: b, fg\ndesigned-random: 200 common cases\n")
     assert "p = " in printed or "p < " in printed
+    assert " fails less: " in printed or "Both fail in as many cases" in printed
     assert "0.000" not in printed
     assert max(map(len, printed.splitlines())) <= WIDTH
     (row,) = json.loads(merge_cosim("compare", "a:pgm", "b:fg", "--json", cwd=folder).stdout)["rows"]
