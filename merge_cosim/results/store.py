@@ -294,8 +294,8 @@ class ResultFolder:
         for row in csv_rows(self.path / NOTES_CSV):
             events.setdefault(row["event"], []).append(row)
         return [
-            f"{event.replace('_', ' ')}: {len(rows):,}, such as: {rows[0]['what']} ({rows[0]['scenario']}, {rows[0]['method']}, scene "
-            f"{rows[0]['scene']}); all in {self.path / NOTES_CSV}"
+            f"{event.replace('_', ' ')}: {len(rows):,}, such as: {rows[0]['what']} ({rows[0]['scenario']}, "
+            f"{rows[0]['method']}, scene {rows[0]['scene']}); all in {self.path / NOTES_CSV}"
             for event, rows in events.items()
         ]
 
