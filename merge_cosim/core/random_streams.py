@@ -7,6 +7,7 @@ pseudorandom number generators, OOPSLA 2014), so whole batches are drawn at once
 from __future__ import annotations
 
 import hashlib
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,12 @@ _UNIT_BITS, _UNIT = np.uint64(11), 2.0**-53
 
 def stream_keys(names: AnyArray, seed: int) -> Keys:
     """Return the key of each name's stream under a seed, shape (n,): the same for the same name at any index."""
-    digests = b"".join(hashlib.blake2b(f"{seed}/{name}".encode(), digest_size=8).digest() for name in names.tolist())
-    return np.frombuffer(digests, dtype="<u8").astype(np.uint64)
+    return np.frombuffer(_digests(tuple(names.tolist()), seed), dtype="<u8").astype(np.uint64)
+
+
+@lru_cache(maxsize=4)  # method after method runs on the same cases
+def _digests(names: tuple[str, ...], seed: int) -> bytes:
+    return b"".join(hashlib.blake2b(f"{seed}/{name}".encode(), digest_size=8).digest() for name in names)
 
 
 def derived_keys(keys: Keys, purpose: str) -> Keys:

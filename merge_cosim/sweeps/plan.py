@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -226,10 +227,11 @@ def _traffic_tasks(scenario: Scenario, variation: str, methods: list[Method], re
                 f'{traffic.file}: no car is the host; add <param key="{ROLE}" value="host"/> to a vType, or name a '
                 f"vehicle or type: --set encounters.host=ID"
             )
+    load = cache(load_models)
     for method in methods:
         if method.is_human or method.needs_label:
             continue
-        for model in _models(method, TRAFFIC, request):
+        for model in _models(method, TRAFFIC, request, load):
             yield Task(
                 scenario=scenario,
                 cases=TrafficCases(traffic, 0, traffic.replications),
@@ -240,12 +242,14 @@ def _traffic_tasks(scenario: Scenario, variation: str, methods: list[Method], re
             )
 
 
-def _models(method: Method, source: str, request: SweepRequest) -> Sequence[IntentionModel | None]:
+def _models(
+    method: Method, source: str, request: SweepRequest, load: Callable[[str], Sequence[IntentionModel]]
+) -> Sequence[IntentionModel | None]:
     """The learned models that a method is to be run with, each of which is found to fit; None for one without."""
     if not method.needs_model:
         return [None]
     chosen = request.model or default_model(source)
-    models = [chosen] if isinstance(chosen, IntentionModel) else load_models(chosen)
+    models = [chosen] if isinstance(chosen, IntentionModel) else load(chosen)
     for model in models:
         method.driver(model)
     return models
@@ -258,13 +262,14 @@ def _encounter_tasks(
     encounters: Encounters | RandomStates,
     request: SweepRequest,
 ) -> Iterator[Task]:
+    load = cache(load_models)
     left_out: tuple[str, ...] = ()
     if isinstance(encounters, Encounters) or not _all_on_the_ramp(scenario, encounters):
         every = encounters if isinstance(encounters, Encounters) else encounters.encounters()
         encounters, left_out = _on_the_ramp(scenario, every)
     for source, cases in _by_source(scenario, encounters, request):
         for method in methods_for(cases.part(0, 1).encounters if source == RANDOM else cases.encounters, methods):
-            models = _models(method, source, request)
+            models = _models(method, source, request, load)
             for model in models:
                 tested = cases if model is None else _not_trained_on(scenario, cases, model, several=len(models) > 1)
                 yield Task(

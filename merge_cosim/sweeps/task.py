@@ -6,6 +6,7 @@ from collections.abc import Container, Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 
@@ -16,7 +17,7 @@ from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.invariants import checked, joined
 from merge_cosim.results.rows import result_rows
-from merge_cosim.results.store import NO_RECORDS, with_facts
+from merge_cosim.results.store import with_facts
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.simulation.loop import Effort, Run, simulate
@@ -151,12 +152,15 @@ class Task:
 
     def _records(self, run: Run) -> pa.Table:
         """The records of a run, one row per cycle."""
-        records = [
-            run.traces[name].assign(scenario=self.scenario.name, case=name, method=self.method.name)
-            for name in map(str, run.encounters.case)
-            if name in run.traces
-        ]
-        return pa.Table.from_pandas(pd.concat([NO_RECORDS, *records]), preserve_index=False).replace_schema_metadata()
+        names = [name for name in map(str, run.encounters.case) if name in run.traces]
+        records = [run.traces[name] for name in names]
+        table = pa.Table.from_pandas(pd.concat([pd.DataFrame(), *records]), preserve_index=False)
+        own = {
+            "scenario": pa.repeat(pa.scalar(self.scenario.name, pa.large_string()), len(table)),
+            "case": pa.array(np.repeat(np.array(names, dtype=object), [*map(len, records)]), pa.large_string()),
+            "method": pa.repeat(pa.scalar(self.method.name, pa.large_string()), len(table)),
+        }
+        return pa.table({**own, **{name: table[name] for name in table.column_names}})
 
     def rows(self, run: Run) -> pa.Table:
         """The result rows of a run."""

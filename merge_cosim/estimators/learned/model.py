@@ -174,7 +174,7 @@ _BOTH = (Intention.YIELD, Intention.NOT_YIELD)
 
 def _speed_model(document: dict[str, Any], lag: str) -> SpeedModel:
     counts = [_dense(document["transitions"][lag][i.name], SPEED_BINS) for i in _BOTH]
-    if not all(count == count.round() for both in counts for count in both.flat):
+    if not all((both == both.round()).all() for both in counts):
         raise ValueError("a count of transitions is not whole")
     return SpeedModel(
         SpeedHistogram(np.stack(counts).astype(np.int64)),
