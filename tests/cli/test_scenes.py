@@ -212,13 +212,23 @@ def test_vehicles_that_sumo_leaves_out_of_an_unsorted_file_are_counted(tmp_path)
     assert "not_departed" not in done.stderr
 
 
-@pytest.mark.parametrize("how", [("sweep",), ("run", "--case", "000")])
-def test_a_scene_without_a_car_that_is_to_merge_is_one_line(tmp_path, how):
-    cars = [car("h1", 5, "main_in"), car("o", 6, "main_in")]
-    own_files(tmp_path, HEAD + "".join(cars) + "</routes>", '<end value="60"/>')
+UNUSED = '<vType id="unused"><param key="merge-cosim.role" value="merging"/></vType>'
+
+
+@pytest.mark.parametrize(
+    ("how", "edge", "kind", "why"),
+    [
+        (("sweep",), "main_in", "", "none drives over the on-ramp"),
+        (("run", "--case", "000"), "main_in", "", "none drives over the on-ramp"),
+        (("sweep",), "ramp", UNUSED, "none is of a type with the role merging"),
+    ],
+)
+def test_a_scene_without_a_car_that_is_to_merge_is_one_line(tmp_path, how, edge, kind, why):
+    cars = [car("h1", 5, "main_in"), car("o", 6, edge)]
+    own_files(tmp_path, HEAD + kind + "".join(cars) + "</routes>", '<end value="60"/>')
     done = merge_cosim(how[0], "my.sumocfg", "--method", "acc", *how[1:], cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
-    assert "nothing to measure: no car came in that is to merge: none drives over the on-ramp" in done.stderr
+    assert "nothing to measure: no car came in that is to merge: " + why in done.stderr
 
 
 def test_hosts_that_never_depart_are_told(tmp_path):

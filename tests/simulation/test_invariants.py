@@ -11,6 +11,8 @@ from merge_cosim.core.observation import Setting
 from merge_cosim.estimators.references import AlwaysGo
 from merge_cosim.merging_cars.base import merging_cars
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.results.invariants import checked
+from merge_cosim.results.rows import result_rows
 from merge_cosim.results.store import MANIFEST, ResultFolder
 from merge_cosim.scoring.invariants import INVARIANTS
 from merge_cosim.scoring.rules import Rules
@@ -91,6 +93,23 @@ def test_a_car_on_the_wrong_lane():
     broken = meddled(astray, at=60).broken
     assert set(broken) == {"lane"}
     assert broken["lane"].sum() == 1
+
+
+@pytest.mark.parametrize(("length", "expected"), [(4.8, 0), (60.0, 8)])
+def test_a_contact_that_sumo_alone_reports(length, expected):
+    """For SUMO the hosts become longer than they are: merging cars that come behind them are in contact with them."""
+
+    def lengthen(session):
+        for tile in range(COUNT):
+            session.set_length(f"t{tile}.host", length)
+
+    run = meddled(lengthen)
+    rows = result_rows(run, run.encounters, Setting(), Acc(), dict.fromkeys(("scenario", "variation", "method"), ""))
+    only_sumo = [row["case"] for row in rows.to_pylist() if row["sumo_collision"] and not row["failed"]]
+    assert len(only_sumo) == expected
+    found = checked(run, rows)
+    assert found["broken"] == ({"contact": expected} if expected else {})
+    assert found["first"] == ({"contact": min(only_sumo)} if expected else {})
 
 
 @pytest.mark.parametrize(("way", "expected"), [(8.0, {"jump"}), (-8.0, {"jump", "station"})])

@@ -59,6 +59,7 @@ class Actors:
         hosts, merging: Those in the net, by SUMO's id; a merging car is forgotten once `forget` says so.
         came: Names of all hosts that have come in so far.
         merging_came: Number of merging cars that have.
+        roles_merging: A type carries the role `merging`, so that only its cars merge.
         departed: Names of all vehicles that have come in so far.
     """
 
@@ -72,7 +73,7 @@ class Actors:
         self.came: set[str] = set()
         self.merging_came = 0
         self.departed: set[str] = set()
-        self._roles_merging = any(self._type_role(kind) == "merging" for kind in session.kinds())
+        self.roles_merging = any(self._type_role(kind) == "merging" for kind in session.kinds())
         for name in session.vehicles():
             self._enter(name)
 
@@ -114,7 +115,7 @@ class Actors:
             if self._host in (kind, name.rpartition(".")[0]) and self._lanes.comes_by_main(session.route(name)):
                 return "host"
         own = session.parameter(name, ROLE) or self._type_role(kind)
-        if own or self._roles_merging:
+        if own or self.roles_merging:
             return own
         return "merging" if self._lanes.comes_by_ramp(session.route(name)) else ""
 

@@ -280,7 +280,10 @@ class TrafficWorld(World):
         if not self.host_count:
             self.notes.add(Event.NO_HOST, "", "no host came in that drives along the main road past the gore")
         if not self._actors.merging_came:
-            self.notes.add(Event.NO_MERGING, "", "no car came in that is to merge: none drives over the on-ramp")
+            line = "no car came in that is to merge: none drives over the on-ramp"
+            if self._actors.roles_merging:
+                line = "no car came in that is to merge: none is of a type with the role merging"
+            self.notes.add(Event.NO_MERGING, "", line)
 
     def _ended(self, gone: list[Meeting], age: IntArray, back: int) -> Ended | None:
         if not gone:
