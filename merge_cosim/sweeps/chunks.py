@@ -70,6 +70,11 @@ class ChunkQueue:
     def __len__(self) -> int:
         return sum(map(len, self._waiting.values()))
 
+    @property
+    def cases(self) -> int:
+        """Cases of the chunks that are still to be run."""
+        return sum(len(chunk) for waiting in self._waiting.values() for chunk in waiting)
+
     def take(self) -> Chunk | None:
         """The next chunk, or None if all have been handed out."""
         methods = [method for method, waiting in self._waiting.items() if waiting]

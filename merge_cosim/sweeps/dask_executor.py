@@ -95,6 +95,9 @@ class Cluster:
                 fill()
                 yield Finished(chunk, rows, effort)
 
+    def close(self) -> None:
+        """See `Executor`; the client is closed after each run."""
+
     @contextmanager
     def _client(self) -> Iterator[Any]:
         if self._address == LOCAL:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import pickle
 import signal
+import sys
 import threading
 import traceback
 from collections import Counter
@@ -45,11 +46,14 @@ class Executor(Protocol):
     """Runs chunks somewhere."""
 
     def run(self, queue: ChunkQueue) -> Generator[Finished]:
-        """Run all chunks of `queue` and yield each as soon as it is done, in any order.
+        """Run all chunks of `queue` and yield each as soon as it is done, in any order; it may be called again.
 
         Raises:
             UserError: There is no place to run them, or a chunk cannot be run.
         """
+
+    def close(self) -> None:
+        """End what still waits for chunks."""
 
 
 def executor_for(request: SweepRequest, chunks: int) -> Executor:
@@ -74,18 +78,25 @@ class InProcess:
         finally:
             worker_session.close()
 
+    def close(self) -> None:
+        """See `Executor`; nothing waits."""
+
 
 class Processes:
-    """Runs the chunks in processes of this machine, each with a SUMO of its own.
+    """Runs the chunks in processes of this machine, each with a SUMO of its own; they stay until it is closed.
 
     Every worker holds one chunk at a time and has its own pipe, so one that is killed takes no other with it: its chunk
     goes to a new worker. (The pool of the standard library breaks as a whole.)
 
     `spawn` starts every worker as a fresh interpreter, which is safe everywhere. `fork` copies this process, which
-    spares a worker its imports; it is refused where threads run, which a copy would not have.
+    spares a worker its imports; it is refused where threads run, which a copy would not have. `auto` is `fork` where
+    nothing but this package can have begun threads, and `spawn` elsewhere.
     """
 
     def __init__(self, jobs: int, plugins: Sequence[Path] = (), start: StartMethod = "spawn") -> None:
+        if start == "auto":
+            alone = sys.platform == "linux" and not plugins and threading.active_count() == 1
+            start = "fork" if alone else "spawn"
         if start not in multiprocessing.get_all_start_methods():
             raise UserError(f"--start {start}: this system cannot; use --start spawn")
         if start == "fork" and threading.active_count() > 1:
@@ -93,41 +104,48 @@ class Processes:
         self._jobs = jobs
         self._plugins = tuple(plugins)
         self._context = multiprocessing.get_context(start)
+        self._workers: dict[Connection, _Worker] = {}
 
     def run(self, queue: ChunkQueue) -> Generator[Finished]:
         """See `Executor`."""
         losses: Counter[str] = Counter()
-        workers: dict[Connection, _Worker] = {}
         try:
-            for _ in range(min(self._jobs, len(queue))):
-                self._start(queue.take(), workers)
-            while busy := [connection for connection, worker in workers.items() if worker.chunk]:
+            for worker in self._workers.values():
+                worker.begin(queue.take())
+            for _ in range(min(self._jobs - len(self._workers), len(queue))):
+                self._start(queue.take())
+            while busy := [connection for connection, worker in self._workers.items() if worker.chunk]:
                 for connection in wait(busy):
                     assert isinstance(connection, Connection)
-                    worker = workers[connection]
+                    worker = self._workers[connection]
                     chunk = worker.chunk
                     assert chunk is not None
                     try:
                         outcome = pickle.loads(connection.recv_bytes())
                     except (EOFError, OSError):
-                        del workers[connection]
+                        del self._workers[connection]
                         losses[chunk.name] += 1
                         if losses[chunk.name] == MOST_LOSSES:
                             raise UserError(_lost(chunk, worker)) from None
                         worker.stop()
-                        self._start(chunk, workers)
+                        self._start(chunk)
                         continue
                     if isinstance(outcome, BaseException):
                         raise outcome
                     worker.begin(queue.take())  # before its rows are stored, so that it need not wait for that
                     yield Finished(chunk, *outcome)
-        finally:
-            for worker in workers.values():
-                worker.stop()
+        except BaseException:
+            self.close()
+            raise
 
-    def _start(self, chunk: Chunk | None, workers: dict[Connection, _Worker]) -> None:
+    def close(self) -> None:
+        """See `Executor`."""
+        while self._workers:
+            self._workers.popitem()[1].stop()
+
+    def _start(self, chunk: Chunk | None) -> None:
         worker = _Worker(self._context, self._plugins)
-        workers[worker.connection] = worker
+        self._workers[worker.connection] = worker
         worker.begin(chunk)
 
 

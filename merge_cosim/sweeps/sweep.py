@@ -37,7 +37,7 @@ from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.adding import joined, missing
 from merge_cosim.sweeps.cases import refuse_empty
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
-from merge_cosim.sweeps.executors import executor_for
+from merge_cosim.sweeps.executors import Executor, executor_for
 from merge_cosim.sweeps.forecast import LONG_S, forecast, seconds
 from merge_cosim.sweeps.identity import identity
 from merge_cosim.sweeps.plan import SweepRequest, plan, refuse_unsound_ramps
@@ -131,11 +131,14 @@ def sweep(
     planned = perf_counter()
     if progress and seconds(tasks, request.jobs) >= LONG_S:
         progress(0, sum(map(len, tasks)), forecast(tasks, request.jobs))
-    tally = _run(request, list(cut(tasks)), folder, progress)
-    ran = perf_counter()
-    folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
-    folder.begin_traces(keep=add)
-    record(request, every, folder, earlier.recorded, progress)
+    chunks, done = list(cut(tasks)), folder.done()
+    queue = ChunkQueue(chunk for chunk in chunks if chunk.name not in done)
+    with closing(executor_for(request, len(queue))) as executor:
+        tally = _run(executor, queue, chunks, folder, progress)
+        ran = perf_counter()
+        folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
+        folder.begin_traces(keep=add)
+        record(request, every, folder, earlier.recorded, executor, progress)
     scenes = folder.scenes()
     _sum_up(tasks, folder, scenes, tally, reference_of(what["methods"], what["against"]), earlier)
     effort, run_s = tally.effort, ran - planned
@@ -183,14 +186,14 @@ def _files(request: SweepRequest) -> list[str]:
     return [spec for spec in request.scenarios if isinstance(spec, str)]
 
 
-def _run(request: SweepRequest, chunks: Sequence[Chunk], folder: ResultFolder, progress: Progress | None) -> _Tally:
-    """Run and store what is not yet stored."""
-    done = folder.done()
-    queue = ChunkQueue(chunk for chunk in chunks if chunk.name not in done)
+def _run(
+    executor: Executor, queue: ChunkQueue, chunks: Sequence[Chunk], folder: ResultFolder, progress: Progress | None
+) -> _Tally:
+    """Run and store the chunks of the queue, which are those of `chunks` that are not yet stored."""
     total = sum(map(len, chunks))
-    finished = sum(len(chunk) for chunk in chunks if chunk.name in done)
+    finished = total - queue.cases
     tally = _Tally()
-    with closing(executor_for(request, len(queue)).run(queue)) as outcomes:
+    with closing(executor.run(queue)) as outcomes:
         for chunk, rows, effort in outcomes:
             folder.add(chunk.name, rows)
             queue.finished(chunk, effort)

@@ -14,7 +14,7 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.results.store import ResultFolder
 from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.sweeps.chunks import ChunkQueue, cut
-from merge_cosim.sweeps.executors import executor_for
+from merge_cosim.sweeps.executors import Executor, InProcess, Processes, executor_for
 from merge_cosim.sweeps.forecast import LONG_S, duration, seconds
 from merge_cosim.sweeps.plan import SweepRequest
 from merge_cosim.sweeps.task import Task
@@ -51,6 +51,7 @@ def record(
     tasks: Sequence[Task],
     folder: ResultFolder,
     earlier: pd.DataFrame,
+    executor: Executor,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> None:
     """Run the chosen cases again and write their traces into a folder whose rows are merged.
@@ -60,17 +61,19 @@ def record(
         tasks: All its tasks.
         folder: The folder.
         earlier: Scenario, case and method of the traces that it holds already and keeps.
+        executor: What ran the cases; its processes, if it has some, go on with these.
         progress: Called with the state of the work, where it takes long.
     """
     again = list(_recorded(request.traces, tasks, folder, earlier))
     cost = seconds(again, request.jobs)
     report = progress if cost >= LONG_S else None
-    how = request if report else replace(request, jobs=1, dask=None)
     total, done = sum(map(len, again)), 0
     if report:
         report(0, total, f"{total:,} runs to record: about {duration(cost)}")
     queue = ChunkQueue(cut(again))
-    with closing(executor_for(how, len(queue)).run(queue)) as outcomes:
+    if not isinstance(executor, Processes):
+        executor = executor_for(request, len(queue)) if report else InProcess()
+    with closing(executor), closing(executor.run(queue)) as outcomes:
         for chunk, records, effort in outcomes:
             queue.finished(chunk, effort)
             folder.add_records(chunk.name, records)

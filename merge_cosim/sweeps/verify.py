@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -112,7 +113,8 @@ def verify(
         parts, expected = some(task, of_task, share, rng)
         tasks += parts
         stored.append(expected)
-    tables = [finished.rows for finished in Processes(jobs, plugins).run(ChunkQueue(cut(tasks)))]
+    with closing(Processes(jobs, plugins)) as executor:
+        tables = [finished.rows for finished in executor.run(ChunkQueue(cut(tasks)))]
     again = pa.concat_tables([table.replace_schema_metadata() for table in tables]).to_pandas()
     chosen = pd.concat(stored, ignore_index=True)
     ramps = {ramp: digest_of(ramp_files(ramp)) for ramp in manifest["ramps"]}

@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+from contextlib import closing
 
 import psutil
 import pyarrow as pa
@@ -25,7 +26,8 @@ def chunks(methods=("acc", "slot"), most=40):
 
 
 def rows(executor, queue=None):
-    finished = list(executor.run(queue or ChunkQueue(chunks())))
+    with closing(executor):
+        finished = list(executor.run(queue or ChunkQueue(chunks())))
     assert len({one.chunk.name for one in finished}) == len(finished) == 6
     for one in finished:
         assert len(one.rows) == len(one.chunk)
@@ -49,9 +51,22 @@ def kill_workers(count, stop, killed):
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize("start", ["spawn", "fork"])
+@pytest.mark.parametrize("start", ["spawn", "fork", "auto"])
 def test_processes_give_the_rows_of_one(expected, start):
     assert rows(Processes(2, start=start)).equals(expected)
+
+
+def test_workers_wait_for_the_next_queue_and_end_with_the_executor(expected):
+    before = set(psutil.Process().children())
+    with closing(Processes(2, start="fork")) as executor:
+        first = list(executor.run(ChunkQueue(chunks())))
+        workers = set(psutil.Process().children()) - before
+        again = list(executor.run(ChunkQueue(chunks())))
+        assert set(psutil.Process().children()) - before == workers
+        assert len(workers) >= 2
+    assert not set(psutil.Process().children()) & workers
+    for found in (first, again):
+        assert pa.concat_tables([one.rows for one in found]).sort_by(KEY).equals(expected)
 
 
 def test_a_killed_worker_costs_its_piece_only(expected):
