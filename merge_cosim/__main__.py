@@ -1,6 +1,20 @@
-"""`python -m merge_cosim`: the command line, where the program `merge-cosim` is not on the path."""
+"""The command line, as `merge-cosim` and as `python -m merge_cosim`."""
 
-from merge_cosim.cli.main import main
+import sys
+
+from merge_cosim.core.signals import interrupted_once
+
+
+def main() -> None:
+    """Run the command line; an interrupt ends it without a traceback also while it is being loaded."""
+    interrupted_once()
+    try:
+        from merge_cosim.cli.main import main as command
+
+        command()
+    except KeyboardInterrupt:
+        sys.exit(130)
+
 
 if __name__ == "__main__":
     main()

@@ -7,17 +7,25 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.signals import interrupted_once
 
 
 def ended_by_signal() -> None:
-    """Let SIGTERM end this process as an error would: workers and programs are ended first; status 143."""
+    """Let SIGTERM end this process as an error would: workers and programs are ended first; status 143.
+
+    Of interrupts see `interrupted_once`.
+    """
+
+    def end_programs() -> None:
+        from merge_cosim.core import programs
+
+        programs.end_programs()
 
     def end(number: int, _: object) -> None:
-        from merge_cosim.core.programs import end_programs
-
         end_programs()
         raise SystemExit(128 + number)
 
+    interrupted_once(end_programs)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, end)
 

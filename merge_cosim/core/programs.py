@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 from collections.abc import Sequence
@@ -19,13 +20,18 @@ PACKAGES = "libatomic1 libexpat1 libgl1 libx11-6 libxext6 libxrender1"
 NOT_LOADED = 127
 """Exit status of a program that the loader could not start."""
 
+_WATCHED = 'exec 3<&0; (read -r _ <&3 || kill -s KILL -- -$$) >/dev/null 2>&1 & exec "$@" </dev/null 3<&-'
+"""For `sh -c`: become the program, and kill its group when the other end of standard input closes without a line."""
+
 _running: set[subprocess.Popen[bytes]] = set()
 
 
 def run_program(
     command: Sequence[str], seconds: float, file: Path, cwd: Path | None = None, captured: bool = True
 ) -> subprocess.CompletedProcess[bytes]:
-    """Run a program to its end; whatever ends the wait for it ends it and what it has started.
+    """Run a program to its end; whatever ends the wait for it, or this process, ends it and what it has started.
+
+    One whose output is not kept, such as an editor with a user's work, outlives a kill of this process.
 
     Args:
         command: The program and its arguments.
@@ -39,10 +45,19 @@ def run_program(
     """
     pipe = subprocess.PIPE if captured else None
     process, ended = None, False
+    if shutil.which(command[0]) is None:
+        raise UserError(f"{command[0]}: cannot be started (no such program)")
+    watched = ["/bin/sh", "-c", _WATCHED, "sh", *command] if captured else command
+    there, here = os.pipe()  # the system closes our end if we are killed
     try:
         with held_back(signal.SIGINT, signal.SIGTERM):  # within Popen they would leave the program behind
             process = subprocess.Popen(
-                command, cwd=cwd, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, start_new_session=True
+                watched,
+                cwd=cwd,
+                stdin=there if captured else subprocess.DEVNULL,
+                stdout=pipe,
+                stderr=pipe,
+                start_new_session=True,
             )
             _running.add(process)
         output, errors = process.communicate(timeout=seconds)
@@ -57,6 +72,10 @@ def run_program(
             if not ended:
                 _end(process)
             _running.discard(process)
+        with suppress(BrokenPipeError):
+            os.write(here, b"\n")
+        for end in (there, here):
+            os.close(end)
     if process.returncode == NOT_LOADED and (line := missing_library((errors or b"").decode(errors="replace"))):
         raise UserError(line)
     return subprocess.CompletedProcess(command, process.returncode, output or b"", errors or b"")

@@ -1,11 +1,54 @@
-"""Signals at moments when they must wait."""
+"""Interrupts: once, at moments when they must wait, and where Python cannot raise them."""
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
+
+SAME = 1.0
+"""Interrupts within this time are one [s]: both the terminal and a program around this one may send it."""
+LATER = 0.02
+"""How long an interrupt waits that came where Python cannot raise it [s]."""
+
+
+def interrupted_once(end: Callable[[], object] = lambda: None) -> None:
+    """Let the first Ctrl-C raise KeyboardInterrupt, and a later one end this process at once, with status 130.
+
+    Where Python can only print an exception, as in a finalizer or in what runs after a fork, the first comes again.
+
+    Args:
+        end: What else a later one ends.
+    """
+    first: list[float] = []
+    printed = sys.unraisablehook
+
+    def interrupted(*_: object) -> None:
+        if not first:
+            first.append(time.monotonic())
+            raise KeyboardInterrupt
+        if time.monotonic() - first[0] > SAME:
+            end()
+            os._exit(130)
+
+    def lost(found: Any) -> None:
+        if not issubclass(found.exc_type, KeyboardInterrupt):
+            printed(found)
+            return
+        first.clear()
+        main = threading.main_thread().ident
+        again = threading.Timer(LATER, lambda: signal.pthread_kill(main or 0, signal.SIGINT))
+        again.daemon = True
+        again.start()
+
+    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, interrupted)
+        sys.unraisablehook = lost
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import pickle
 import signal
 import sys
@@ -201,6 +202,7 @@ def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path
     """What a worker process does: run what comes through the pipe, until that is empty or closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process gets it, too, and ends the workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     if inherited is not None:
         inherited.close()  # else the worker would not notice the end of its parent process
     worker_session = WorkerSession()
@@ -220,6 +222,14 @@ def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path
         pass
     finally:
         worker_session.close()
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent is gone, also amid a chunk; what it has written so far has a scratch name."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _lost(chunk: Chunk, worker: _Worker) -> str:

@@ -68,7 +68,7 @@ def test_what_it_says_and_its_status(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
 def test_a_signal_ends_the_program_too(tmp_path: Path, number: int) -> None:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(
@@ -77,7 +77,7 @@ def test_a_signal_ends_the_program_too(tmp_path: Path, number: int) -> None:
         pids(tmp_path)
         caller.send_signal(number)
         status = caller.wait(20)
-    assert status == (143 if number == signal.SIGTERM else -signal.SIGINT)
+    assert status == (143 if number == signal.SIGTERM else -number)
     assert_ended(tmp_path)
 
 

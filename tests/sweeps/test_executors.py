@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import threading
 import time
 from contextlib import closing
@@ -9,6 +10,7 @@ from contextlib import closing
 import psutil
 import pyarrow as pa
 import pytest
+from command import COMMAND
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.estimators.base import estimators
@@ -80,6 +82,38 @@ def test_a_killed_worker_costs_its_piece_only(expected):
         killer.join()
     assert len(killed) == 2
     assert found.equals(expected)
+
+
+@pytest.mark.parametrize("start", ["spawn", "fork"])
+def test_workers_end_with_a_sweep_that_is_killed(tmp_path, start):
+    (tmp_path / "stuck.py").write_text(
+        """
+import os, time
+from pathlib import Path
+import merge_cosim as mc
+
+@mc.estimator
+class Stuck(mc.Estimator):
+    def update(self, seen):
+        Path(f"{os.getpid()}.pid").touch()
+        time.sleep(600)
+"""
+    )
+    words = ("sweep", "designed-random", "--set", "encounters.count=40", "--world", "closed-form")
+    words += ("--method", "stuck,stuck+lqr", "--plugin", "stuck.py", "--jobs", "2", "--start", start)
+    with subprocess.Popen([*COMMAND, *words], cwd=tmp_path, env=os.environ) as sweep:
+        try:
+            until = time.monotonic() + 60
+            while len(pids := list(tmp_path.glob("*.pid"))) < 2:
+                assert (sweep.poll(), time.monotonic() < until) == (None, True)
+                time.sleep(0.02)
+            workers = [psutil.Process(int(file.stem)) for file in pids]
+        finally:
+            sweep.kill()
+    until = time.monotonic() + 20
+    while any(worker.is_running() and worker.status() != psutil.STATUS_ZOMBIE for worker in workers):
+        assert time.monotonic() < until
+        time.sleep(0.02)
 
 
 @pytest.fixture
