@@ -1,6 +1,9 @@
-"""The particle filter over state and maneuver, one encounter after the other: no sum depends on the batch."""
+"""The particle filter over state and maneuver, one encounter after the other: no sum depends on the batch.
 
-from math import exp
+Arrays are copied by loops: to compile `a[:] = b` takes numba several times as long.
+"""
+
+from math import exp, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -134,7 +137,8 @@ def step(
         station, speed, maneuver = cloud.station[row], cloud.speed[row], cloud.maneuver[row]
         further, faster, now = between.station[held], between.speed[held], between.maneuver[held]
         place, key = np.uint64(drawn[n]), keys[n]
-        now[:] = maneuver
+        for i in range(particles):
+            now[i] = maneuver[i]
         if filter_law.change > 0:
             change(now, key, place, filter_law.change)
             place += np.uint64(particles)
@@ -153,7 +157,8 @@ def step(
         shares = np.zeros(MANEUVERS)
         for i in range(particles):
             shares[now[i]] += weights[held, i]
-        belief[:, n] = shares
+        for i in range(MANEUVERS):
+            belief[i, n] = shares[i]
         kept = particles - filter_law.new
         choose(weights[held], uniform(key, place), kept, chosen)
         place += np.uint64(1)
@@ -167,7 +172,8 @@ def step(
             station[kept + j] = scene.station[n] + filter_law.sigma_station * noise[j]
             speed[kept + j] = max(scene.speed[n] + filter_law.sigma_speed * noise[filter_law.new + j], 0.0)
         choose(shares, uniform(key, place), filter_law.new, chosen)
-        maneuver[kept:] = chosen[: filter_law.new]
+        for j in range(filter_law.new):
+            maneuver[kept + j] = chosen[j]
         drawn[n] = place + np.uint64(1)
 
 
@@ -186,11 +192,12 @@ def weigh(
     station: FloatArray, speed: FloatArray, seen_station: float, seen_speed: float, law: FilterLaw, weights: FloatArray
 ) -> None:
     """Fill in the weights of the particles of one encounter, which sum to 1; shape (M,)."""
+    least = inf
     for i in range(len(weights)):
         away = (seen_station - station[i]) * (1.0 / law.sigma_station)
         off = (seen_speed - speed[i]) * (1.0 / law.sigma_speed)
         weights[i] = away * away + off * off
-    least = weights.min()
+        least = min(least, weights[i])
     total = 0.0
     for i in range(len(weights)):
         weights[i] = exp(-0.5 * (weights[i] - least))
