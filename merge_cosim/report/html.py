@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import jinja2
@@ -47,8 +48,8 @@ def data_uri(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
-def render(template: str, **values: Any) -> str:
-    """Fill in one of the templates."""
+@cache
+def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("merge_cosim.report"),
         autoescape=True,
@@ -57,4 +58,9 @@ def render(template: str, **values: Any) -> str:
         undefined=jinja2.StrictUndefined,
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
-    return environment.get_template(template).render(values, colors=colors)
+    return environment
+
+
+def render(template: str, **values: Any) -> str:
+    """Fill in one of the templates."""
+    return _environment().get_template(template).render(values, colors=colors)

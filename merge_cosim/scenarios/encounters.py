@@ -19,7 +19,7 @@ from merge_cosim.ngsim.sites import Site, shipped_sites, site
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.scenarios.hidden import hidden_encounters
-from merge_cosim.scenarios.random_states import RandomStates
+from merge_cosim.scenarios.random_states import RandomStates, designed_encounters
 from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.scenarios.sources import ByArrival, Grid, Pairs, Random, Routes, Table, Traffic
 from merge_cosim.sumo.route_reader import read_sumocfg
@@ -126,14 +126,4 @@ def _grid(grid: Grid) -> Encounters:
     axes = (grid.host_offset.values(), grid.host_speed.values(), grid.merging_speed.values())
     offset, host_speed, merging_speed = (np.array(column) for column in zip(*product(*axes), strict=True))
     cases = [f"d{d:+g}_h{h:g}_m{m:g}" for d, h, m in zip(offset, host_speed, merging_speed, strict=True)]
-    return Encounters.unlogged(
-        np.array(cases),
-        "designed",
-        "designed",
-        host_station=grid.merging_station + offset,
-        host_speed=host_speed,
-        host_length=grid.length,
-        merging_station=grid.merging_station,
-        merging_speed=merging_speed,
-        merging_length=grid.length,
-    )
+    return designed_encounters(grid, cases, "designed", offset, host_speed, merging_speed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.units import FloatArray, IntArray
-from merge_cosim.scenarios.sources import Random
+from merge_cosim.scenarios.sources import Grid, Random
 
 SOURCE = "random"
 BLOCK = 4_096
@@ -79,14 +80,27 @@ class RandomStates:
         bits.advance(len(spans) * self.first)  # of which each number takes one
         shares = np.random.Generator(bits).random((len(self), len(spans)))
         offset, host_speed, merging_speed = (low + width * shares).T.copy()
-        return Encounters.unlogged(
-            np.array([f"r{number:07d}" for number in range(self.first, self.last)]),
-            "designed",
-            SOURCE,
-            host_station=states.merging_station + offset,
-            host_speed=host_speed,
-            host_length=states.length,
-            merging_station=states.merging_station,
-            merging_speed=merging_speed,
-            merging_length=states.length,
-        )
+        names = [f"r{number:07d}" for number in range(self.first, self.last)]
+        return designed_encounters(states, names, SOURCE, offset, host_speed, merging_speed)
+
+
+def designed_encounters(
+    states: Grid | Random,
+    names: Sequence[str],
+    source: str,
+    offset: FloatArray,
+    host_speed: FloatArray,
+    merging_speed: FloatArray,
+) -> Encounters:
+    """Encounters that differ in the host's offset [m] and in both speeds [m/s], shape (n,) each."""
+    return Encounters.unlogged(
+        np.array(names),
+        "designed",
+        source,
+        host_station=states.merging_station + offset,
+        host_speed=host_speed,
+        host_length=states.length,
+        merging_station=states.merging_station,
+        merging_speed=merging_speed,
+        merging_length=states.length,
+    )

@@ -92,36 +92,13 @@ class Everything(Container[str]):
         return True
 
 
-def simulate(
-    world: World,
-    encounters: Encounters | None,
-    driver: HostDriver,
-    merging_car: MergingCar,
-    rules: Rules,
-    setting: Setting,
-    traced: Container[str] = (),
-    seed: int = 0,
-) -> Run:
-    """Run encounters in a world, each until it is scored, fails or times out.
+class Loop:
+    """Runs encounters in a world, each until it is scored, fails or times out.
 
     Nothing that an encounter goes through depends on its slot or on its neighbours, so its outcome is the same
-    whatever the batch and the number of slots.
-
-    Args:
-        world: What moves the cars.
-        encounters: The n encounters; None for a world that finds its encounters.
-        driver: The host's method.
-        merging_car: How the merging cars drive.
-        rules: When an encounter is scored.
-        setting: Speed limit and cycle.
-        traced: Names of the encounters to record cycle by cycle.
-        seed: Seed of the random streams, one per encounter.
+    whatever the batch and the number of slots. A caller that makes the world's steps itself calls `before_step` and
+    `after_step` around each, and `finish` at the end, in place of `run`.
     """
-    return Loop(world, encounters, driver, merging_car, rules, setting, traced, seed).run()
-
-
-class Loop:
-    """A run in progress. `before_step` and `after_step` enclose the step, for a caller that makes the steps itself."""
 
     def __init__(
         self,
@@ -134,7 +111,18 @@ class Loop:
         traced: Container[str] = (),
         seed: int = 0,
     ) -> None:
-        """Make ready; see `simulate`."""
+        """Make ready.
+
+        Args:
+            world: What moves the cars.
+            encounters: The n encounters; None for a world that finds its encounters.
+            driver: The host's method.
+            merging_car: How the merging cars drive.
+            rules: When an encounter is scored.
+            setting: Speed limit and cycle.
+            traced: Names of the encounters to record cycle by cycle.
+            seed: Seed of the random streams, one per encounter.
+        """
         self._world, self._merging_car, self._setting, self._rules = world, merging_car, setting, rules
         self._traced = traced
         self._leader = LeaderRule(driver.controller, setting)

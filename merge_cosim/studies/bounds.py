@@ -33,7 +33,7 @@ from merge_cosim.scenarios.scenario import Scenario, load_scenario
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.scoring.scoring import GOAL
 from merge_cosim.simulation.host_driver import HostDriver
-from merge_cosim.simulation.loop import simulate
+from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 from merge_cosim.studies.clairvoyant import Search, search_plans
 from merge_cosim.studies.minimum_delay import Ahead, Reach, earliest_pass_behind
@@ -123,7 +123,7 @@ def bounds(scenario: Scenario, encounters: Encounters, search: Search | None = F
     setting = Setting(speed_limit=scenario.speed_limit or Ramp.load(scenario.ramp).speed_limit)
 
     def drive(driver: HostDriver) -> dict[str, AnyArray]:
-        return simulate(ClosedFormWorld(len(encounters)), encounters, driver, merging_car, rules, setting).columns
+        return Loop(ClosedFormWorld(len(encounters)), encounters, driver, merging_car, rules, setting).run().columns
 
     throttle = drive(HostDriver(AlwaysYield(), Throttle(max_acceleration=law.max_acceleration)))
     brake = drive(HostDriver(AlwaysYield(), Brake(min_acceleration=law.min_acceleration)))

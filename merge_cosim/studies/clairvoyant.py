@@ -62,7 +62,7 @@ class Plans:
     arrival: FloatArray
 
     def driver(self, encounters: Encounters) -> HostDriver:
-        """What drives the encounters by their plans in `simulate` with seed 0."""
+        """What drives the encounters by their plans in a `Loop` with seed 0."""
         keys = stream_keys(encounters.case, 0)
         return HostDriver(_Numbered(keys=keys), _Planned(plans=self))
 

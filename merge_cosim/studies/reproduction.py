@@ -58,7 +58,7 @@ def reproduce(
         out: Folder to write to.
         jobs: Processes.
         seed: Seed of SUMO and of every random stream.
-        say: Called with a line of text before each step.
+        say: Called with the work done, all work and what is being run.
         world: What moves the cars.
     """
     found = studies(data, out, jobs, seed, say, world)

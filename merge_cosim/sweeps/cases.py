@@ -6,7 +6,7 @@ import hashlib
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
@@ -210,15 +210,14 @@ class PairCases(Cases):
         self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
     ) -> Iterator[AbstractContextManager[Opened]]:
         """See `Cases`; a single world."""
-        yield self._opened(ramp, seed, worker_session, options, human)
+        if human:
+            yield nullcontext(Opened(LoggedHostWorld(len(self)), seed, no_facts))
+        else:
+            yield self._opened(ramp, seed, worker_session, options)
 
     @contextmanager
-    def _opened(
-        self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
-    ) -> Iterator[Opened]:
-        if human:
-            yield Opened(LoggedHostWorld(len(self)), seed, no_facts)
-        elif options == AS_IN_A_SWEEP:
+    def _opened(self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions) -> Iterator[Opened]:
+        if options == AS_IN_A_SWEEP:
             yield Opened(worker_session.world(ramp, len(self), seed, self.host), seed, no_facts)
         else:
             worker_session.close()
@@ -316,13 +315,7 @@ class LoggedCases(PairCases):
         return hashlib.sha256(f"{super().digest(ramp)} {scenes}".encode()).hexdigest()[:16]
 
     @contextmanager
-    def _opened(
-        self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
-    ) -> Iterator[Opened]:
-        if human:
-            with super()._opened(ramp, seed, worker_session, options, human) as opened:
-                yield opened
-            return
+    def _opened(self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions) -> Iterator[Opened]:
         if options.attach is not None:
             raise UserError("--attach: not with full_scene, which starts SUMO with a recording's cars; leave it out")
         worker_session.close()

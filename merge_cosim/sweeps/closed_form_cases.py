@@ -39,14 +39,8 @@ class ClosedFormCases(PairCases):
     most: ClassVar[int] = CHUNK_CASES
 
     @contextmanager
-    def _opened(
-        self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions, human: bool
-    ) -> Iterator[Opened]:
-        if human:
-            with super()._opened(ramp, seed, worker_session, options, human) as opened:
-                yield opened
-        else:
-            yield Opened(ClosedFormWorld(min(len(self), self.side_by_side)), seed, no_facts)
+    def _opened(self, ramp: Ramp, seed: int, worker_session: WorkerSession, options: RunOptions) -> Iterator[Opened]:
+        yield Opened(ClosedFormWorld(min(len(self), self.side_by_side)), seed, no_facts)
 
 
 def side_by_side(rules: Rules) -> int:

@@ -20,7 +20,7 @@ from merge_cosim.results.rows import result_rows
 from merge_cosim.results.store import with_facts
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import Scenario
-from merge_cosim.simulation.loop import Effort, Run, simulate
+from merge_cosim.simulation.loop import Effort, Loop, Run
 from merge_cosim.simulation.worlds.base import World
 from merge_cosim.simulation.worlds.logged_host import Undecided
 from merge_cosim.sweeps.cases import AS_IN_A_SWEEP, Cases, Facts, RunOptions
@@ -137,7 +137,7 @@ class Task:
         """Simulate the cases in a world, with the given seed of the encounters' random streams."""
         scenario = self.scenario
         driver = Undecided() if self.method.is_human else self.method.driver(self.model, scenario.sensor())
-        run = simulate(
+        run = Loop(
             world,
             self.cases.encounters,
             driver,
@@ -146,7 +146,7 @@ class Task:
             self.setting,
             traced,
             seed,
-        )
+        ).run()
         # The row `human` is made from the log: neither SUMO nor a method was at work.
         return replace(run, effort=Effort()) if self.method.is_human else run
 

@@ -19,7 +19,7 @@ from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.scenarios.sources import ByArrival
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.simulation.host_driver import HostDriver
-from merge_cosim.simulation.loop import simulate
+from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 
 YIELD, NOT_YIELD = int(Intention.YIELD), int(Intention.NOT_YIELD)
@@ -140,7 +140,7 @@ def test_noise_has_its_deviation_and_time_constant():
 def test_cases_do_not_depend_on_their_batch():
     def run(rows, tiles):
         driver = HostDriver(estimators["slot-time"](), controllers["acc"]())
-        return simulate(ClosedFormWorld(tiles), ENCOUNTERS.take(rows), driver, Hidden(), Rules(), Setting()).columns
+        return Loop(ClosedFormWorld(tiles), ENCOUNTERS.take(rows), driver, Hidden(), Rules(), Setting()).run().columns
 
     rows = np.arange(60)
     whole = run(rows, 60)

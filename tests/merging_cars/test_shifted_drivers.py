@@ -14,7 +14,7 @@ from merge_cosim.scenarios.encounters import load_encounters
 from merge_cosim.scenarios.scenario import family, load_scenario
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.simulation.host_driver import HostDriver
-from merge_cosim.simulation.loop import simulate
+from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 
 FEW = {"encounters.count": 40}
@@ -132,7 +132,7 @@ def run(member, rows, slots):
     scenario = load_scenario(member, FEW)
     encounters = load_encounters(scenario, None, None).take(rows)
     driver = HostDriver(estimators["slot-time"](), controllers["acc"]())
-    return simulate(ClosedFormWorld(slots), encounters, driver, scenario.merging_car(), Rules(), Setting()).columns
+    return Loop(ClosedFormWorld(slots), encounters, driver, scenario.merging_car(), Rules(), Setting()).run().columns
 
 
 @pytest.mark.parametrize("member", MEMBERS)

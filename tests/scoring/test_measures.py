@@ -13,14 +13,14 @@ from merge_cosim.results.rows import post_encroachment
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.scoring.scoring import KINDS
 from merge_cosim.simulation.host_driver import HostDriver
-from merge_cosim.simulation.loop import simulate
+from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 
 
 def outcome(seed, method):
     encounters = random_encounters(40, seed)
     driver = HostDriver(estimators[method](), controllers["acc"]())
-    run = simulate(ClosedFormWorld(40), encounters, driver, merging_cars["designed"](), Rules(), Setting())
+    run = Loop(ClosedFormWorld(40), encounters, driver, merging_cars["designed"](), Rules(), Setting()).run()
     return encounters, run.columns, post_encroachment(run.columns, encounters, 0.1)
 
 

@@ -14,7 +14,7 @@ from merge_cosim.scoring.rules import Rules
 from merge_cosim.sensors.base import sensors
 from merge_cosim.sensors.noisy import Noisy
 from merge_cosim.simulation.host_driver import HostDriver
-from merge_cosim.simulation.loop import simulate
+from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 
 COUNT = 12
@@ -54,7 +54,7 @@ def run(estimator, sensor, encounters, slots):
     if made.needs_model:
         made.use(IntentionModel.load("us101-ngsim"))
     driver = HostDriver(made, controllers[made.default_controller](), sensor)
-    return simulate(ClosedFormWorld(slots), encounters, driver, Designed(), Rules(), Setting()).columns
+    return Loop(ClosedFormWorld(slots), encounters, driver, Designed(), Rules(), Setting()).run().columns
 
 
 @pytest.mark.parametrize("estimator", estimators.names())

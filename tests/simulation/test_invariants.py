@@ -17,7 +17,7 @@ from merge_cosim.results.store import MANIFEST, ResultFolder
 from merge_cosim.scoring.invariants import INVARIANTS
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.simulation.host_driver import HostDriver
-from merge_cosim.simulation.loop import Run, simulate
+from merge_cosim.simulation.loop import Loop, Run
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 from merge_cosim.simulation.worlds.tiles import TiledWorld
 
@@ -38,7 +38,7 @@ def run(world, controller=None, merge_position=0.0) -> Run:
     encounters = random_encounters(COUNT, seed=3, merge_position=merge_position)
     driver = HostDriver(AlwaysGo(), controller or Acc())
     try:
-        return simulate(world, encounters, driver, merging_cars["designed"](), Rules(), Setting())
+        return Loop(world, encounters, driver, merging_cars["designed"](), Rules(), Setting()).run()
     finally:
         world.close()
 

@@ -15,7 +15,7 @@ from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.simulation.host_driver import HostDriver
 from merge_cosim.simulation.leader import LeaderRule
-from merge_cosim.simulation.loop import Run, simulate
+from merge_cosim.simulation.loop import Loop, Run
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 from merge_cosim.simulation.worlds.tiles import TiledWorld
 from merge_cosim.sumo.lane_map import LaneMap
@@ -26,7 +26,7 @@ def run(world, encounters: Encounters, method: str, traced=()) -> Run:
     if estimator.needs_model:
         estimator.use(IntentionModel.load("us101-ngsim"))
     driver = HostDriver(estimator, controllers[estimator.default_controller]())
-    return simulate(world, encounters, driver, merging_cars["designed"](), Rules(), Setting(), traced)
+    return Loop(world, encounters, driver, merging_cars["designed"](), Rules(), Setting(), traced).run()
 
 
 def on_sumo(ramp: str, tiles: int, encounters: Encounters, method: str, traced=()) -> Run:

@@ -9,7 +9,7 @@ from merge_cosim.core.observation import Setting
 from merge_cosim.results.rows import delay, free_time
 from merge_cosim.scenarios.encounters import load_encounters
 from merge_cosim.scenarios.scenario import load_scenario
-from merge_cosim.simulation.loop import simulate
+from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
 from merge_cosim.studies.bounds import bounds
 from merge_cosim.studies.clairvoyant import Plans, Search, search_plans
@@ -26,7 +26,7 @@ def hidden():
 
 def drive(plans, scenario, encounters):
     world, driver = ClosedFormWorld(len(encounters)), plans.driver(encounters)
-    return simulate(world, encounters, driver, scenario.merging_car(), scenario.test, SETTING).columns
+    return Loop(world, encounters, driver, scenario.merging_car(), scenario.test, SETTING).run().columns
 
 
 def test_no_plan_of_three_holds_is_better(hidden):

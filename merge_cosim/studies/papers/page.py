@@ -83,7 +83,7 @@ def write_reproduction(studies: Sequence[Study], out: Path, say: Say) -> Path:
     Args:
         studies: The finished studies.
         out: Folder of the reproduction.
-        say: Called with a line of text before each part.
+        say: Called with the reports written, all reports, and what is being written.
 
     Returns:
         The page.

@@ -9,13 +9,13 @@ from merge_cosim.merging_cars.replay import Replay
 from merge_cosim.ngsim.pairing.encounters import site_encounters
 from merge_cosim.ngsim.sites import site
 from merge_cosim.scoring.rules import Rules
-from merge_cosim.simulation.loop import simulate
+from merge_cosim.simulation.loop import Loop
 from merge_cosim.simulation.worlds.logged_host import LoggedHostWorld, Undecided
 
 
 def run_logged(encounters, traced=()):
     world = LoggedHostWorld(len(encounters))
-    return simulate(world, encounters, Undecided(), Replay(), Rules(), Setting(), traced)
+    return Loop(world, encounters, Undecided(), Replay(), Rules(), Setting(), traced).run()
 
 
 def logged_pair(host, merging, label=0):
