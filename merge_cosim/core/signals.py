@@ -66,3 +66,20 @@ def held_back(*numbers: signal.Signals) -> Iterator[None]:
             signal.signal(number, handler)
         for which in arrived:
             signal.raise_signal(which)
+
+
+@contextmanager
+def interrupts_ignored() -> Iterator[None]:
+    """Processes that are started here ignore Ctrl-C: this process gets it afterwards, and ends them."""
+    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
+        yield  # Windows has no masks, and no other thread is interrupted
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # it would be started with the first process, and unblock the signal there
+    with held_back(signal.SIGINT):  # for threads without the mask
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import pyarrow as pa
 
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.task import Task
@@ -47,6 +49,14 @@ def cut(tasks: Sequence[Task], most: int | None = None) -> Iterator[Chunk]:
         ends = np.linspace(0, len(task), -(-len(task) // (most or task.most)) + 1).astype(np.int64)
         for chunk, (first, last) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)):
             yield Chunk(f"{number:04d}-{chunk:05d}", task, first, last, float(task.part(first, last).cycles().sum()))
+
+
+class Finished(NamedTuple):
+    """A chunk that has been run."""
+
+    chunk: Chunk
+    rows: pa.Table
+    effort: Effort
 
 
 class ChunkQueue:

@@ -16,10 +16,10 @@ import pyarrow as pa
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import cache_folder, write_atomically
 from merge_cosim.core.registry import load_plugin
+from merge_cosim.core.signals import interrupts_ignored
 from merge_cosim.ramps.ramp import find_ramp
 from merge_cosim.simulation.loop import Effort
-from merge_cosim.sweeps.chunks import Chunk, ChunkQueue
-from merge_cosim.sweeps.executors import Finished, interrupts_ignored
+from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, Finished
 from merge_cosim.sweeps.identity import digest, digest_of, ramp_files, software
 from merge_cosim.sweeps.shipping import main_hidden, pack, unpack
 from merge_cosim.sweeps.worker_session import WorkerSession

@@ -10,21 +10,17 @@ import sys
 import threading
 import traceback
 from collections import Counter
-from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from multiprocessing import resource_tracker
+from collections.abc import Generator, Sequence
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import BaseContext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
-
-import pyarrow as pa
+from typing import TYPE_CHECKING, Any, Protocol
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import load_plugin
-from merge_cosim.core.signals import held_back
-from merge_cosim.simulation.loop import Effort
-from merge_cosim.sweeps.chunks import Chunk, ChunkQueue
+from merge_cosim.core.signals import interrupts_ignored
+from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, Finished
 from merge_cosim.sweeps.shipping import dumps, main_hidden, pack, unpack
 from merge_cosim.sweeps.worker_session import WorkerSession
 
@@ -33,14 +29,6 @@ if TYPE_CHECKING:  # a worker process plans nothing, and need not import what pl
 
 MOST_LOSSES = 3
 """Workers that one chunk may lose before the sweep gives up on it."""
-
-
-class Finished(NamedTuple):
-    """A chunk that has been run."""
-
-    chunk: Chunk
-    rows: pa.Table
-    effort: Effort
 
 
 class Executor(Protocol):
@@ -181,21 +169,6 @@ class _Worker:
                 self.connection.send_bytes(b"")
         self.connection.close()
         self.process.join()
-
-
-@contextmanager
-def interrupts_ignored() -> Iterator[None]:
-    """Processes that are started here ignore Ctrl-C: this process gets it afterwards, and ends them."""
-    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
-        yield  # Windows has no masks, and no other thread is interrupted
-        return
-    resource_tracker.ensure_running()  # it would be started with the first process, and unblock the signal there
-    with held_back(signal.SIGINT):  # for threads without the mask
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            yield
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
