@@ -16,6 +16,7 @@ import pandas as pd
 from blocks import fill_page, page_parser, table
 
 import merge_cosim as mc
+from merge_cosim.report.methods import looks
 from merge_cosim.studies.bounds import MOST_DELAY
 
 METHODS = ["acc", "slot", "slot-time", "pgm", "pgm-symmetric", "fg-gmm", "dbn-pf", "ipcb", "interactive"]
@@ -85,14 +86,14 @@ def line(method: str, rows: pd.DataFrame) -> list[str]:
 def draw(rows: pd.DataFrame, target: Path) -> None:
     """For each method the share of its cases that passed, by delay beyond the clairvoyant host's."""
     figure, axis = plt.subplots(figsize=(8, 4.4), layout="constrained")
-    styles = ["-", "--", ":"]
-    colours = plt.get_cmap("tab10").colors
+    chosen = looks(rows["method"])
     for method, part in sorted(rows.groupby("method"), key=lambda item: order(item[0])):
         part = part[~part["censored"]]
         passed = np.sort(part.loc[~(part["failed"] | part["stuck"]), "beyond_s"])
         share = 100 * np.arange(1, len(passed) + 1) / max(len(part), 1)
-        number = order(method)
-        axis.step(passed, share, styles[number % 3], color=colours[number % 10], where="post", label=method)
+        look = chosen[method]
+        shape = {"color": look.color, "marker": look.mark, "markevery": 0.15, "ms": 5}
+        axis.step(passed, share, look.line, where="post", label=method, **shape)
     axis.set(xlim=(-0.5, 3 * MOST_DELAY), ylim=(0, 101), xlabel="delay beyond the clairvoyant host's [s]")
     axis.set_ylabel("cases passed [%]")
     axis.grid(alpha=0.3)
