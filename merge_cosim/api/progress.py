@@ -16,6 +16,9 @@ from merge_cosim.sweeps.forecast import duration
 LINE_EVERY_S = 10.0
 """Time between two plain lines [s]; a sweep that takes less prints none."""
 
+SURE_FROM = 0.1
+"""Share of the cases after which the time left is told: the first ones also wait for workers to be ready."""
+
 Progress = Callable[[int, int, str], None]
 """Takes the cases done, the cases in all, and what is being run; with none done, what there is to run."""
 
@@ -55,4 +58,6 @@ class _Lines:
         elif now - self._last >= LINE_EVERY_S:
             self._last = now
             left = (now - self._begin) * (total - done) / done
-            print(f"{done:,} of {total:,}, about {duration(left)} left: {what}", file=sys.stderr, flush=True)
+            tells = SURE_FROM * total <= done < total
+            told = f", about {duration(left)} left" if tells else ""
+            print(f"{done:,} of {total:,}{told}: {what}", file=sys.stderr, flush=True)

@@ -158,7 +158,7 @@ def sweep(
         typer.echo(line, err=True)
     if again:
         if not json:
-            show_verification(again)
+            show_verification(again, only_beyond=True)
         if again.beyond:
             raise typer.Exit(1)
 

@@ -41,9 +41,10 @@ def verification(found: Verification) -> dict[str, Any]:
     return {"rows": found.rows, "beyond": found.beyond, "differences": rows, "notes": found.notes}
 
 
-def show_verification(found: Verification) -> None:
-    """Print what came out of running rows again."""
-    if rows := verification(found)["differences"]:
+def show_verification(found: Verification, only_beyond: bool = False) -> None:
+    """Print what came out of running rows again, with the columns that differ, or only those beyond the tolerance."""
+    rows = verification(found)["differences"]
+    if rows and (found.beyond or not only_beyond):
         show_table([{str(name): _exact(value) for name, value in row.items()} for row in rows], "what differs")
     for line in (*found.notes, str(found)):
         print(line)
