@@ -175,8 +175,8 @@ class Encounters:
             case: Their names, shape (n,).
             site: Of all of them.
             source: Of all of them.
-            **given: The initial states and lengths, and whatever else differs; a number stands for all and takes no
-                room.
+            **given: The initial states and lengths, and other attributes that are not the default;
+                a number is the value of all encounters.
         """
         usual = {"merge_position": 0.0, "label": int(Intention.UNKNOWN)}
         flags = {"smoothed_source": False, "length_missing": False}
@@ -202,7 +202,7 @@ class Encounters:
             sample: The states are a random sample, so that failure rates get confidence intervals.
 
         Raises:
-            UserError: A column is missing or unknown, or a value cannot be.
+            UserError: A column is missing or unknown, or a value is out of range.
         """
         from merge_cosim.core.frames import states_of
 
@@ -224,7 +224,7 @@ class Encounters:
         return replace(self, **arrays, log=None if self.log is None else self.log.take(rows))
 
     def part(self, first: int, last: int) -> Encounters:
-        """Return the encounters `first` to `last - 1`, as views where that can be."""
+        """Return the encounters `first` to `last - 1`, as views where possible."""
         arrays = {f.name: getattr(self, f.name)[first:last] for f in fields(self) if f.name != "log"}
         return replace(self, **arrays, log=None if self.log is None else self.log.take(np.arange(first, last)))
 

@@ -1,4 +1,4 @@
-"""What a policy can look at: numbers that are computed from an observation, by name."""
+"""Features of an observation, by name, as inputs of learned policies."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def checked(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def lower_bounds(names: Sequence[str]) -> FloatArray:
-    """The least that each feature can be, shape (len(names),)."""
+    """Lower bound of each feature, shape (len(names),)."""
     return np.array([_OF[name][1] for name in names])
 
 

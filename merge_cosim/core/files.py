@@ -29,7 +29,7 @@ def cache_folder(*parts: str) -> Path:
 
 
 def without_comma(file: Path) -> str:
-    """A path for an option of SUMO's programs, which take a comma for the end of a file's name.
+    """A path for an option of SUMO's programs, which split lists of files at commas.
 
     Raises:
         UserError: There is one in it.
@@ -40,7 +40,7 @@ def without_comma(file: Path) -> str:
 
 
 def write_atomically(target: Path, content: bytes) -> None:
-    """Write a file so that another process sees it whole or not at all."""
+    """Write a file so that other processes see either the whole file or none."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=target.name)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -58,13 +58,13 @@ def from_cache(place: Path, make: Callable[[Path], object]) -> Path:
 
 
 def keep(place: Path, make: Callable[[Path], object]) -> None:
-    """Make a file or folder of the cache, unless another process has done so.
+    """Make a file or folder of the cache, unless another process has made it meanwhile.
 
     It is made under another name and moved to `place` when it is whole. A digest of its content is kept beside it.
 
     Args:
-        place: Where it is to lie, in a folder that exists.
-        make: Writes it to the path that it is given.
+        place: Its path; the folder exists.
+        make: Function that writes it to a path.
     """
     with FileLock(_beside(place, "lock")):
         if is_whole(place):

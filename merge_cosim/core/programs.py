@@ -29,16 +29,16 @@ _running: set[subprocess.Popen[bytes]] = set()
 def run_program(
     command: Sequence[str], seconds: float, file: Path, cwd: Path | None = None, captured: bool = True
 ) -> subprocess.CompletedProcess[bytes]:
-    """Run a program to its end; whatever ends the wait for it, or this process, ends it and what it has started.
+    """Run a program to its end. An exception here, or the end of this process, ends it and all that it has started.
 
-    One whose output is not kept, such as an editor with a user's work, outlives a kill of this process.
+    A program whose output is not kept, such as an editor with unsaved work, is not ended when this process is killed.
 
     Args:
         command: The program and its arguments.
         seconds: Time limit [s].
         file: What it works on, for the line about a limit that is passed.
         cwd: The folder to run it in.
-        captured: Keep what it prints; else it prints where this process does.
+        captured: Return what it prints; else its output goes where this process prints.
 
     Raises:
         UserError: It cannot be started, takes too long, or lacks a system library.
@@ -50,7 +50,7 @@ def run_program(
     watched = ["/bin/sh", "-c", _WATCHED, "sh", *command] if captured else command
     there, here = os.pipe()  # the system closes our end if we are killed
     try:
-        with held_back(signal.SIGINT, signal.SIGTERM):  # within Popen they would leave the program behind
+        with held_back(signal.SIGINT, signal.SIGTERM):  # an exception within Popen would leave the program running
             process = subprocess.Popen(
                 watched,
                 cwd=cwd,

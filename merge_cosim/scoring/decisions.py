@@ -16,7 +16,7 @@ def decisions(tracks: Tracks) -> dict[str, FloatArray]:
 
     `last_decision`: 1 NOT_YIELD, 0 YIELD, -1 none (also where the log-odds are NaN); `decided_from`: the cycle since
     which it stands; `log_odds_G` and `arrival_lead_G` (T_h - T_m [s]): of the first cycle in which the merging car is G
-    m away or less, NaN where it started nearer or a car was through.
+    m away or less, NaN where it started nearer, or where a car had passed the merging point.
     """
     states, age = tracks.states, tracks.age
     still_open = np.maximum(states.host_station, states.merging_station) < -TOLERANCE

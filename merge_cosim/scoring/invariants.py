@@ -38,7 +38,7 @@ class Bounds(NamedTuple):
 
     @classmethod
     def of(cls, *laws: object) -> Bounds:
-        """The widest of what the laws of a host allow, as their parameters state it."""
+        """The widest bounds among a host's laws, from their parameters."""
         least = min(float(getattr(law, "min_acceleration", -HARDEST)) for law in laws)
         return cls(least, max(float(getattr(law, "max_acceleration", HARDEST)) for law in laws))
 
@@ -60,7 +60,7 @@ def broken(tracks: Tracks, host: Bounds, merging: Bounds) -> dict[str, BoolArray
 
     def within(name: str, values: FloatArray, least: float, largest: float) -> None:
         if np.minimum.reduce(values) >= least and np.maximum.reduce(values) <= largest:
-            return  # NaN does not come here
+            return  # no NaN here
         wrong = np.flatnonzero(~((values >= least) & (values <= largest)))
         where = found.setdefault(name, np.zeros(len(tracks.case), dtype=bool))
         where[tracks.encounter[wrong]] = True

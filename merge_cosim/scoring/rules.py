@@ -14,9 +14,9 @@ from merge_cosim.core.observation import Observation
 from merge_cosim.core.units import DT, TOLERANCE, BoolArray, FloatArray, IntArray
 
 USUAL_ACCELERATION = 1.0
-"""Acceleration [m/s^2] by which the length of a case is guessed."""
+"""Acceleration [m/s^2] that the estimate of a case's length assumes."""
 
-_Seconds = Annotated[float, Field(gt=0, le=3600)]  # every cycle until then has room in the memory
+_Seconds = Annotated[float, Field(gt=0, le=3600)]  # every cycle of it is kept in memory
 
 
 @dataclass(frozen=True)
@@ -46,14 +46,14 @@ class Rules:
         return round(self.time_out / DT)
 
     def begun(self, now: Observation) -> BoolArray:
-        """Where the cars stand so that scoring begins."""
+        """Where both cars are far enough for scoring to begin."""
         if self.overlap_from == "both":
             return np.minimum(now.host_station, now.merging_station) >= -TOLERANCE
         return now.merging_in_lane
 
 
 def end_of(states: Observation, rules: Rules) -> int:
-    """The cycle in which an encounter was over that was recorded beyond that, by the rules of `Watch`.
+    """The cycle in which an encounter was over, by the rules of `Watch`; its record may go on after it.
 
     Args:
         states: Its states from the first on, shape (N,) each.

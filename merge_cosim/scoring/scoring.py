@@ -55,7 +55,9 @@ def _braking(tracks: Tracks) -> dict[str, FloatArray]:
     change[tracks.first], change[tracks.first + 1] = 0.0, 0.0
     return {
         "hardest_braking": np.maximum.reduceat(braking, tracks.first),
-        "jerk_sum": np.bincount(tracks.encounter, change),  # one after the other, so what else is scored changes no bit
+        "jerk_sum": np.bincount(
+            tracks.encounter, change
+        ),  # one after the other: the sum of an encounter does not depend on the others
     }
 
 

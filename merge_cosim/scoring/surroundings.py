@@ -1,4 +1,4 @@
-"""What came near a host beside the merging car: its leader and its follower in the lane."""
+"""Gaps between a host and its leader and follower in the lane."""
 
 from __future__ import annotations
 

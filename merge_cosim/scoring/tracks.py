@@ -24,7 +24,7 @@ class Tracks:
 
     Attributes:
         states: All states, shape (N,) each.
-        log_odds: The belief in each state; an encounter's last state has none, and what stands there means nothing.
+        log_odds: The belief in each state; an encounter's last state has none, and its value is arbitrary.
         case: Index of each encounter's case, shape (m,).
         cycles: Number of cycles of each encounter, at least 1, one less than it has states; shape (m,).
         around: What the world recorded beside the states, by channel, shape (N,) each.

@@ -14,10 +14,10 @@ from merge_cosim.core.units import FloatArray
 
 
 class LeaderRule:
-    """The law of the method's controller where that is a law of following, else `acc` with its defaults.
+    """Keeps a host behind its leader by its controller's law of following, or by `acc` where the controller has none.
 
     Attributes:
-        law: It.
+        law: The law of following.
     """
 
     def __init__(self, controller: Controller, setting: Setting) -> None:

@@ -48,7 +48,7 @@ class Recorder:
 
     @property
     def seen(self) -> Observation:
-        """The present cycle; it is made once for all, and shows what begins later in the same cycle."""
+        """The present cycle; a view of the ring, so encounters that begin later in this cycle appear in it."""
         return self._seen[self._now]
 
     def decided(self, log_odds: FloatArray, command: FloatArray) -> None:

@@ -1,4 +1,4 @@
-"""What is added to a finished sweep: what it must share with that, and what of it is left to run."""
+"""Adding to a finished sweep: which settings must agree, and which tasks are still to be run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STATES = {
 
 
 def joined(before: Mapping[str, Any], new: dict[str, Any], against: str | None, folder: Path) -> dict[str, Any]:
-    """The identity of a sweep and what is added to it: that of one sweep of all.
+    """The identity of a sweep together with what is added to it, as if both had been run as one.
 
     Args:
         before: The manifest of the sweep before.
@@ -39,7 +39,7 @@ def joined(before: Mapping[str, Any], new: dict[str, Any], against: str | None, 
         folder: Its folder, for messages.
 
     Raises:
-        UserError: They are not of the same settings, scenarios, versions and so on.
+        UserError: Settings, scenarios, versions or other inputs differ.
     """
     changed = [key for key in SAME if before.get(key) != new[key]]
     changed += [f"{key} {name}" for key in NAMED for name in _unlike(before[key], new[key])]
@@ -66,14 +66,14 @@ def joined(before: Mapping[str, Any], new: dict[str, Any], against: str | None, 
 
 
 def missing(tasks: Sequence[Task], folder: ResultFolder) -> Iterator[Task]:
-    """What of some tasks a reopened folder does not hold.
+    """The parts of some tasks whose rows a reopened folder does not hold.
 
     Args:
         tasks: The tasks.
         folder: The folder.
 
     Raises:
-        UserError: A case of the same name begins otherwise.
+        UserError: A case of the same name has another initial state.
     """
     scenes = {tuple(scene[name] for name in NAMES) for scene in folder.scenes()}
     for task in tasks:
@@ -105,7 +105,7 @@ def _unlike(before: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
 
 
 def _compared(entry: Any) -> Any:
-    """What must be the same: of a scenario whose cases may be more, all but its encounters."""
+    """What must be the same; of a scenario that may get more cases, all but its encounters."""
     encounters = entry.get("encounters") if isinstance(entry, dict) else None
     if isinstance(encounters, dict) and encounters["kind"] in GROWING:
         return {name: value for name, value in entry.items() if name != "encounters"}

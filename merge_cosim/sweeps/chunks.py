@@ -16,11 +16,11 @@ from merge_cosim.sweeps.task import Task
 
 @dataclass(frozen=True)
 class Chunk:
-    """A stretch of a batch's cases: what is handed to a process, and stored, as a whole.
+    """Consecutive cases of a task, which one process runs and whose rows are stored together.
 
     Attributes:
         name: Number of the task and of the chunk in it; the same in every run of the sweep.
-        whole: The whole of it.
+        whole: The task.
         first, last: The cases `first` to `last - 1`.
         cycles: Expected cycles of all its cases.
     """
@@ -35,7 +35,7 @@ class Chunk:
         return self.last - self.first
 
     def task(self) -> Task:
-        """The stretch as a task of its own."""
+        """These cases as a task of their own."""
         return self.whole.part(self.first, self.last)
 
     def __str__(self) -> str:
@@ -44,7 +44,7 @@ class Chunk:
 
 
 def cut(tasks: Sequence[Task], most: int | None = None) -> Iterator[Chunk]:
-    """Cut tasks into chunks of at most `most` cases (None: each task's own), as even as can be."""
+    """Cut tasks into chunks of nearly equal size and at most `most` cases; None takes each task's own limit."""
     for number, task in enumerate(tasks):
         ends = np.linspace(0, len(task), -(-len(task) // (most or task.most)) + 1).astype(np.int64)
         for chunk, (first, last) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)):
@@ -95,7 +95,7 @@ class ChunkQueue:
         return self._waiting[longest].pop()
 
     def finished(self, chunk: Chunk, effort: Effort) -> None:
-        """Learn from a chunk how long its method takes."""
+        """Note how long a chunk took, from which the time of its method's other chunks is estimated."""
         self._seconds[chunk.whole.method.name] += effort.wall_s
         self._cycles[chunk.whole.method.name] += chunk.cycles
 

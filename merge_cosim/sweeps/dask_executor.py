@@ -35,7 +35,7 @@ ONE_THREAD = "libsumo holds one simulation per process; start the workers with: 
 
 @dataclass(frozen=True)
 class WorkerFiles:
-    """What a worker elsewhere needs beside the task, which carries cases, scenario, method and model.
+    """Files that a worker on another machine needs beside the task with its cases, scenario, method and model.
 
     Attributes:
         software: What this process runs; a worker that runs anything else is refused.
@@ -53,7 +53,7 @@ class WorkerFiles:
 class Cluster:
     """Runs the chunks on the workers of a Dask scheduler.
 
-    A worker that is lost costs the chunks it held, which the scheduler gives to others; workers may come and go.
+    Chunks of a lost worker are given to others by the scheduler; workers may join and leave during the sweep.
     """
 
     def __init__(self, address: str, jobs: int = 1, plugins: Sequence[Path] = ()) -> None:
@@ -78,7 +78,7 @@ class Cluster:
             done = self._distributed.as_completed()
 
             def fill() -> None:
-                """Keep a chunk ahead of every worker, no more, so that the longest still go first."""
+                """Submit one chunk per worker in advance and no more, so that the longest still go first."""
                 while len(running) < 2 * max(1, len(client.nthreads())) and (chunk := queue.take()):
                     ramp = chunk.whole.scenario.ramp
                     if ramp not in worker_files_of:
@@ -193,7 +193,7 @@ def _load_shipped(name: str, content: bytes) -> None:
 
 
 def _unpack(kind: str, files: Mapping[str, bytes], name: str) -> Path:
-    """Write files that came along into a folder of the cache that is named by their content."""
+    """Write a worker's files into a folder of the cache whose name is a hash of them."""
     folder = cache_folder("shipped", kind, digest_of(files), name)
     for key, content in files.items():
         if not (folder / key).is_file() or (folder / key).read_bytes() != content:

@@ -1,4 +1,4 @@
-"""What a sweep depends on: the same rows come out of the same identity, here, elsewhere and later."""
+"""What the rows of a sweep depend on: sweeps of the same identity have the same rows on any machine."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from merge_cosim.sweeps.task import Task
 
 
 def identity(request: SweepRequest, tasks: Sequence[Task]) -> dict[str, Any]:
-    """What makes two sweeps the same."""
+    """All that the rows of a sweep depend on; it stands in the manifest."""
     models = {task.model.name: task.model for task in tasks if task.model}
     return {
         "versions": software(),
@@ -69,7 +69,7 @@ def versions() -> dict[str, str]:
 
 @cache
 def software() -> Mapping[str, str]:
-    """The same, and a digest of this package's source: two states of the code may bear one version."""
+    """The versions, and a digest of this package's source: two states of the code may have the same version."""
     folder = Path(merge_cosim.__file__).parent
     source = {file.relative_to(folder).as_posix(): file.read_bytes() for file in folder.rglob("*.py")}
     return versions() | {"merge-cosim's source": digest_of(source)}

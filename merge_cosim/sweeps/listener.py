@@ -59,8 +59,8 @@ class HostListener(StepListener):  # type: ignore[misc]
             method: Estimator, or estimator+controller.
             model: Model file or name; None for the project's own.
             settings: Parameters by `component.parameter`, as `acc.headway`.
-            speed_limit: Speed of a host that nothing hinders [m/s]; None for the ramp's limit.
-            host: A vehicle, flow or type that is a host without saying so.
+            speed_limit: Speed of a host on a free road [m/s]; None for the ramp's limit.
+            host: A vehicle, flow or type that is a host without the parameter.
             attention: Which merging cars a host attends to.
             rules: How encounters are scored.
             seed: Seed of the methods' random streams.

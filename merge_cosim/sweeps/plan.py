@@ -62,7 +62,7 @@ class SweepRequest:
         source: Force real data or the surrogate.
         seed: SUMO's seed.
         plugins: Files with the user's own components.
-        jobs: Processes.
+        jobs: Number of processes.
         start: How processes come to be, see `executors.Processes`.
         dask: Address of a Dask scheduler, or `local`; None for processes of this machine.
         against: Method that the others are compared with on the same cases; None for pgm, if it is there.
@@ -90,7 +90,7 @@ class SweepRequest:
 
 
 def plan(request: SweepRequest) -> list[Task]:
-    """Work out what to run, one task per (scenario, variation, method); all mistakes of the user show here.
+    """Work out what to run, one task per (scenario, variation, method); every mistake in the request raises here.
 
     In whatever order the user names scenarios and methods, the tasks come in the same one: a resumed sweep knows its
     chunks by their numbers.
@@ -155,7 +155,7 @@ def tasks_of(
         given: Its encounters, where a Python program hands them over.
 
     Raises:
-        UserError: Its data are absent or do not fit.
+        UserError: Its data are missing or do not fit.
     """
     if scenario.is_scene:
         return _traffic_tasks(scenario, variation, methods, request)
@@ -177,7 +177,7 @@ def method_names(request: SweepRequest, tasks: Sequence[Task]) -> list[str]:
 def _scenarios(
     specs: Sequence[ScenarioSpec], settings: dict[str, Any], varied: str
 ) -> list[tuple[Scenario, Encounters | None]]:
-    """Load the scenarios; one that does not know what is varied is left as it is, if another does."""
+    """Load the scenarios; one without the varied key stays as it is, if another scenario has it."""
     loaded: dict[str, tuple[Scenario, Encounters | None]] = {}
     refused = []
     for number, spec in enumerate(specs):
@@ -245,7 +245,7 @@ def _traffic_tasks(scenario: Scenario, variation: str, methods: list[Method], re
 def _models(
     method: Method, source: str, request: SweepRequest, load: Callable[[str], Sequence[IntentionModel]]
 ) -> Sequence[IntentionModel | None]:
-    """The learned models that a method is to be run with, each of which is found to fit; None for one without."""
+    """The learned models that a method is to be run with, checked to fit it; None for a method without one."""
     if not method.needs_model:
         return [None]
     chosen = request.model or default_model(source)
@@ -302,7 +302,7 @@ def _by_source(
 
 
 def _in_scenes(scenario: Scenario, encounters: Encounters, source: str, request: SweepRequest) -> LoggedCases:
-    """The encounters among the cars that were logged with them."""
+    """The encounters, each with the logged cars around it."""
     assert scenario.full_scene is not None
     if request.world == "closed-form":
         raise _needs_sumo(scenario, "full_scene")

@@ -1,7 +1,7 @@
-"""Tasks as bytes for other processes and machines; the user's own classes that they need go along.
+"""Tasks as bytes for other processes and machines, together with the user's classes that they need.
 
 A class of a notebook or a script cannot be imported elsewhere, so cloudpickle sends its code. The same is done for a
-module that lies beside the script; modules of an installed package, and plugin files, are imported by the worker.
+module in the script's folder; modules of an installed package, and plugin files, are imported by the worker.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def sources(tasks: Sequence[Task]) -> dict[str, str]:
 
 
 class _Pickler(cloudpickle.Pickler):  # type: ignore[misc]
-    """cloudpickle's, which would make further ones of the marks in the fields of a dataclass."""
+    """cloudpickle's; by default it copies the marks of dataclass fields, which are compared by identity."""
 
     dispatch_table: ClassVar = ChainMap(
         {
@@ -57,7 +57,7 @@ class _Pickler(cloudpickle.Pickler):  # type: ignore[misc]
 
 
 def dumps(value: object) -> bytes:
-    """Any value as bytes, to be read by `pickle.loads`; classes of `__main__` go along."""
+    """Any value as bytes, to be read by `pickle.loads`; the code of classes of `__main__` is in them."""
     file = BytesIO()
     _Pickler(file).dump(value)
     return file.getvalue()
@@ -92,7 +92,7 @@ def unpack(packed: bytes) -> Task:
 
 @contextmanager
 def main_hidden() -> Iterator[None]:
-    """Processes that begin here do not run the user's script once more; its classes come with the tasks."""
+    """Processes that are started here do not run the user's script again; its classes come with the tasks."""
     main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     try:
         yield

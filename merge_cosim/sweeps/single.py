@@ -36,11 +36,11 @@ def trace_case(
 ) -> tuple[dict[str, Any], pd.DataFrame]:
     """Run a task of one case and return its result row and its record, one row per cycle.
 
-    A case of living traffic is a scene, whose facts stand for the row, or an encounter in it (`SCENE/HOST/MERGING`).
+    A case of living traffic is a scene, with its facts as the row, or an encounter in it (`SCENE/HOST/MERGING`).
 
     Raises:
         UserError: There is no such encounter; or the method is the log itself and a window, SUMO's outputs or a running
-            SUMO are asked for; or SUMO is not as it must be.
+            SUMO are asked for; or SUMO does not run as it must.
     """
     asked = {"--gui": gui_delay is not None, "SUMO's outputs": outputs.wanted}
     for name in (name for name, given in asked.items() if given and attach is not None):

@@ -29,7 +29,7 @@ from merge_cosim.sweeps.worker_session import WorkerSession
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """Cases of one scenario that are run under one method; they can be parted.
+    """Cases of one scenario that are run under one method.
 
     Attributes:
         scenario: The scenario, variation applied.
@@ -39,7 +39,7 @@ class Task:
         model: Its learned model, if it needs one.
         seed: SUMO's seed.
         left_out: Names of cases of the scenario that do not fit on its ramp.
-        recorded: Names of encounters that are to be recorded: then these records are what comes out, not rows.
+        recorded: Names of encounters to record; with any, `run` returns their records in place of result rows.
     """
 
     scenario: Scenario
@@ -56,12 +56,12 @@ class Task:
 
     @property
     def most(self) -> int:
-        """Most cases that are handed out at a time."""
+        """Most cases in a chunk."""
         return self.cases.most
 
     @property
     def names(self) -> dict[str, str]:
-        """What all rows have in common."""
+        """Values of the columns that are the same in all rows."""
         return {
             "scenario": self.scenario.name,
             "variation": self.variation,
@@ -92,7 +92,7 @@ class Task:
         return self.cases.digest(self.ramp)
 
     def part(self, first: int, last: int) -> Self:
-        """The cases `first` to `last - 1`, made only when asked for, so that a million cases are not held twice."""
+        """The cases `first` to `last - 1`, as a task of their own."""
         return replace(self, cases=self.cases.part(first, last), left_out=())
 
     def take(self, rows: IntArray) -> Self:
@@ -147,7 +147,7 @@ class Task:
             traced,
             seed,
         ).run()
-        # The row `human` is made from the log: neither SUMO nor a method was at work.
+        # The row `human` is made from the log, without SUMO and without a method.
         return replace(run, effort=Effort()) if self.method.is_human else run
 
     def _records(self, run: Run) -> pa.Table:

@@ -32,14 +32,14 @@ from merge_cosim.sweeps.task import Task
 
 @dataclass(frozen=True)
 class Verification:
-    """What came out of running rows again.
+    """Result of running stored rows again.
 
     Attributes:
         path: The result folder.
         rows: Number of rows that were run again.
         stored: Number of rows in the folder.
         differences: A row per column in which values differ, see `results.agreement.agreement`.
-        notes: What is not as it was when the folder was made: versions, ramps.
+        notes: What differs from when the folder was made, such as versions and ramps.
     """
 
     path: Path
@@ -93,7 +93,7 @@ def verify(
         tolerance: See `results.agreement.agreement`.
 
     Raises:
-        UserError: The folder holds no finished sweep, or what it was made from is not here.
+        UserError: The folder holds no finished sweep, or its scenarios, data or models are missing.
     """
     if not 0 < share <= 1:
         raise UserError(f"share {share:g}: must be above 0 and at most 1")
@@ -182,7 +182,7 @@ def _drawn(count: int, share: float, rng: np.random.Generator) -> IntArray:
 
 
 def _changes(what: str, then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:
-    """A line for each entry that is not the same any more."""
+    """A line for each entry that has changed."""
     for name in sorted({*then, *now}):
         if then.get(name) != now.get(name):
             yield f"{what}: {name} was {then.get(name, 'absent')}, is {now.get(name, 'absent')}"

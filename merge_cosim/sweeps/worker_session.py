@@ -22,7 +22,7 @@ class WorkerSession:
         self._world: TiledWorld | None = None
 
     def world(self, ramp: Ramp, cases: int, seed: int, host: Way = "main") -> TiledWorld:
-        """A world on this ramp, with no more tiles than there are cases."""
+        """The open world on this ramp, or a new one; it has at most as many tiles as there are cases."""
         tiles = min(self._tiles, cases)
         wanted = (str(ramp.net), tiles, seed, host)
         if self._world is None or self._open != wanted:

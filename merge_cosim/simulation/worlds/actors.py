@@ -1,4 +1,4 @@
-"""The hosts and the cars that are yet to merge in a running SUMO, updated in every cycle."""
+"""The hosts and the cars that have not merged yet in a running SUMO, read in every cycle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Actor:
         x: Its front bumper [m past the gore].
         speed: Its speed [m/s].
         sumo_lane: SUMO's id of the lane.
-        has_come: It has been on the ramp's paths.
+        has_come: It has been on one of the ramp's paths.
         goes_on: The lane leads to the next edge of its route, or its route ends there.
         driven: It is a host that the method drives.
     """
@@ -56,11 +56,11 @@ class Actors:
     The method drives a host on the host lane, up to the edge on which its route leaves that lane. Elsewhere SUMO does.
 
     Attributes:
-        hosts, merging: Those in the net, by SUMO's id; a merging car is forgotten once `forget` says so.
-        came: Names of all hosts that have come in so far.
-        merging_came: Number of merging cars that have.
+        hosts, merging: Those in the net, by SUMO's id; merging cars until `forget` is called.
+        came: Names of all hosts that have entered so far.
+        merging_came: Number of merging cars that have entered so far.
         roles_merging: A type carries the role `merging`, so that only its cars merge.
-        departed: Names of all vehicles that have come in so far.
+        departed: Names of all vehicles that have entered so far.
     """
 
     def __init__(self, session: Session, lanes: LaneMap, host: str = "") -> None:
@@ -78,7 +78,7 @@ class Actors:
             self._enter(name)
 
     def update(self) -> None:
-        """Take in which cars came and left in the last step, and the positions of all."""
+        """Read which cars entered and left in the last step, and the positions of all."""
         session, lanes = self._session, self._lanes
         for name in session.arrived():
             self.hosts.pop(name, None)
@@ -102,7 +102,7 @@ class Actors:
                 self._drive(host, not host.driven)
 
     def forget(self, merging: str) -> None:
-        """Watch a merging car no longer."""
+        """Stop reading a merging car."""
         self.merging.pop(merging, None)
 
     def role(self, name: str) -> str:
@@ -133,7 +133,7 @@ class Actors:
         self.came.add(name)
 
     def _drive(self, host: Actor, method: bool) -> None:
-        """Let the method drive a host, or SUMO again."""
+        """Let the method drive a host, or give it back to SUMO."""
         host.driven = method
         if method:
             self._session.take_control(host.name)

@@ -1,4 +1,4 @@
-"""The world protocol: what moves the cars of encounters, each of which has a slot as long as it lasts."""
+"""Base class of worlds. A world moves the cars of encounters; an encounter has a slot from its begin to its end."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Begun:
         slots: Where, shape (m,).
         cases: Their numbers in `World.encounters`, where these are known beforehand. Shape (m,).
         start: Stations of host and merging car, their speeds, their lengths [m, m/s, m], shape (6, m).
-        labels: What log or script say of each driver (`Intention`), shape (m,).
+        labels: Intention of each driver by its log or script (`Intention`), shape (m,).
         keys: Keys of their random streams, shape (m,).
         score_until: Last cycle of each that may be scored; `NEVER` without one. Shape (m,).
         around: Values of the world's channels, shape (channels, m).
@@ -57,9 +57,9 @@ class Ended:
         slots: Where, shape (m,).
         cases: Their numbers in `World.encounters`; -1 for those that are not scored. Shape (m,).
         names: Their names.
-        back: How many of the last recorded states are no longer theirs.
+        back: Number of the last recorded states that lie after their end.
         begun_at: Time in the world at which each began [s], shape (m,).
-        points: Where station 0 turned out to be, for worlds that find it out on the way [m past the gore].
+        points: Place of station 0, for worlds that know it only once the car has merged [m past the gore].
     """
 
     slots: IntArray
@@ -79,8 +79,8 @@ class World(ABC):
         kind: What moves the cars.
         channels: What is recorded of each encounter and cycle beside both cars' states.
         slots: Number of slots; it may grow.
-        commanded: The hosts are driven by the method, so that they keep within its bounds.
-        step_s: Time [s] spent inside the steps of what moves the cars; commanding and reading is not in it.
+        commanded: The hosts are driven by the method, so its bounds of acceleration are checked.
+        step_s: Time [s] inside the simulator's steps, without the time to command and to read cars.
         vehicle_steps: Cars times steps, where the world counts them; None for the two cars of each encounter.
         shown: It is shown in a window, which also shows what the hosts believe and decide.
         worst_difference_m: Largest difference of the stations from the closed form, at an encounter's end [m].
@@ -129,7 +129,7 @@ class World(ABC):
 
     @abstractmethod
     def step(self) -> None:
-        """Simulate one cycle and take in what came of it."""
+        """Simulate one cycle and read the new states."""
 
     @abstractmethod
     def observe(self, state: FloatArray, around: FloatArray) -> None:
@@ -157,7 +157,7 @@ class World(ABC):
         return None
 
     def settled(self, track: FloatArray, point: float) -> FloatArray:
-        """A recorded track with its stations counted from where station 0 turned out to be; see `Ended.points`."""
+        """A recorded track with its stations relative to `Ended.points`."""
         return track
 
     def columns(self) -> dict[str, AnyArray]:
@@ -165,7 +165,7 @@ class World(ABC):
         return {"sumo_collision": np.zeros(len(self.encounters), dtype=bool)}
 
     def broken(self) -> dict[str, BoolArray]:
-        """Which encounters break an invariant that the world itself looks at, shape (n,) each; see `INVARIANTS`."""
+        """Which encounters break an invariant that the world itself checks, shape (n,) each; see `INVARIANTS`."""
         return {}
 
     def close(self) -> None:
@@ -175,8 +175,8 @@ class World(ABC):
 class GivenWorld(World):
     """A world whose encounters are known beforehand: a slot that becomes free takes the next one.
 
-    The encounters that will last longest go first, so that all slots end together. What a subclass adds: `place`,
-    `command`, `step`, `observe`.
+    The encounters that will last longest go first, so that all slots end together. A subclass defines `place`,
+    `command`, `step` and `observe`.
 
     Attributes:
         collided: Slots in which a contact was reported since the encounter there began, shape (slots,).
@@ -208,13 +208,13 @@ class GivenWorld(World):
         self.worst_difference_m = 0.0
 
     def restart(self) -> None:
-        """Free all slots, whatever runs there."""
+        """Free all slots; encounters in them are dropped."""
         self._case[:] = -1
         self._free = np.arange(self.slots)
         self._active = 0
 
     def line_up(self, cases: IntArray) -> None:
-        """Let these encounters begin next, which may have run before, and no others; shape (m,)."""
+        """Make these encounters, shape (m,), the only ones to begin from now on; they may have run before."""
         self._queue = cases
 
     @property

@@ -97,7 +97,7 @@ class LoggedWorld(GivenWorld):
         self._simulate()
         self._cars = self._session.vehicle_count()
         self._traffic.take_over(pair.host)
-        self._session.stay_on(pair.host, self._ramp.main_route)  # wherever its log leads
+        self._session.stay_on(pair.host, self._ramp.main_route)  # whatever lane its log has
         for car, color in zip((pair.host, pair.merging), COLORS, strict=True):
             self._session.set_color(car, color)
         if self.shown:

@@ -51,7 +51,7 @@ class LoggedHostWorld(ClosedFormWorld):
 
 
 class Undecided(HostDriver):
-    """Believes nothing (NaN) and commands nothing, for a world whose hosts need no method."""
+    """A method without belief (NaN) and without commands, for a world whose hosts need none."""
 
     def __init__(self) -> None:
         super().__init__(AlwaysGo(), Acc())

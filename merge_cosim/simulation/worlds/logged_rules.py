@@ -15,7 +15,7 @@ class FullScene:
     Attributes:
         others: `log`: all keep to their logs, and may drive through the host; `released`: those that come near the host
             are handed to SUMO's models. The merging car keeps to its log.
-        take_over: When the method takes the wheel, from the encounter's start on [s]; it observes from the start.
+        take_over: Time after the encounter's start from which the method drives [s]; it observes from the start on.
         heed_leader: The host keeps distance to the car ahead in its lane as well.
         ahead, behind: Which cars are near [m]; see `LoggedTraffic.release_near`.
         drivers: How released cars drive.

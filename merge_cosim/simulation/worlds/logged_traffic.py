@@ -25,13 +25,14 @@ class LoggedTraffic:
 
     After `advance(k)` and a step, SUMO shows cycle k: every driven car has the x and the lane of its log. A car comes
     in where its log starts and is taken out when the log ends. SUMO must run with steps of 0.1 s, without internal
-    links (x is a sum of edges' lengths), with collisions that are left alone (`collision.action` none or warn), and
+    links (x is a sum of edges' lengths), without action on collisions (`collision.action` none or warn), and
     with the type that `ReleasedDrivers` writes.
 
     Attributes:
         released: Names of the cars that were handed to SUMO, in that order.
         taken: Names of the cars that a method or the replay drives.
-        blocked: Names of the cars that did not come in: a car off its log was too close, or is an earlier part of them.
+        blocked: Names of the cars that did not enter: a car off its log was too close, or an earlier
+            part of the same car's track is in the net.
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class LoggedTraffic:
         self._cycle = cycle
 
     def take_over(self, car: str) -> None:
-        """Drive a car no longer; it keeps its last command until it gets another.
+        """Stop driving a car by its log; its last command stays in force until the next.
 
         Raises:
             ValueError: It is not in the net on its log.
@@ -236,7 +237,7 @@ def logged_road(ramp: Ramp) -> LoggedRoad:
 
 
 def _ways(scene: LoggedScene) -> FloatArray:
-    """Way of the step that leads to each row [m], shape (rows,); to a car's first row, as long as the next one."""
+    """Distance driven in the step to each row [m], shape (rows,); a car's first row has that of its next one."""
     way = np.diff(scene.x, prepend=0.0)
     first, several = scene.offsets[:-1], np.diff(scene.offsets) > 1
     way[first[several]] = way[first[several] + 1]

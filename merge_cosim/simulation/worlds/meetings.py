@@ -67,7 +67,7 @@ class Meeting:
         return f"{self.host.name}/{self.merging.name}"
 
     def merging_point(self, usual: float) -> float:
-        """Where the car merges, as far as one can know [m past the gore]; `usual` is where cars merge on this ramp."""
+        """Where the car merges, by what is known in this cycle [m past the gore]; `usual`: the ramp's merging point."""
         if self.merged_at >= 0:
             return self.merge_position
         return max(usual, self.merging.x + MARGIN)
