@@ -84,8 +84,8 @@ def grid_of(
         count: Number of small panels.
         across: Most panels in a row.
         cell: Width and height of one [in].
-        sharex: They share the horizontal axis, too.
-        titles: What will stand above them; long ones take several lines, for which there is room.
+        sharex: They share the horizontal axis as well as the vertical one.
+        titles: Their titles, which may take several lines; the figure is made high enough.
     """
     across = min(across, count)
     wanted = _PAPER.get().width

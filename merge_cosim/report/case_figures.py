@@ -29,7 +29,7 @@ DASHES = (0, (5, 2.5))
 
 @dataclass(frozen=True)
 class _Path:
-    """What several methods did alike.
+    """A path that several methods drove.
 
     Attributes:
         methods: Those methods.
@@ -56,7 +56,7 @@ def path_figures(traces: pd.DataFrame, failed: Mapping[str, bool], looks: Mappin
         looks: How the methods are drawn.
 
     Returns:
-        Figure of the stations and figure of the speeds. Methods whose cars drove alike share one line.
+        Figure of the stations and figure of the speeds. Methods whose cars drove the same path share one line.
     """
     paths = _paths(traces, failed)
     return (
@@ -140,7 +140,7 @@ def _alike(one: pd.DataFrame, other: pd.DataFrame) -> bool:
 
 
 def _same_merging_car(paths: list[_Path]) -> pd.DataFrame | None:
-    """The longest record of the merging car if it drove alike under all methods."""
+    """The longest record of the merging car, if it drove the same path under all methods."""
     longest = max((path.trace for path in paths), key=len)
     for path in paths:
         stations = path.trace["merging_station_m"].to_numpy(dtype=float)

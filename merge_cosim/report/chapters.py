@@ -33,13 +33,13 @@ MAPPED = ("grid", "random", "drawn")
 
 @dataclass(frozen=True)
 class Chapter:
-    """What the page says about one section.
+    """One section of the page.
 
     Attributes:
         key: Its id in the page.
         section: What it is about.
         title, source, about: Its heading, the source in words, and the scenario's own description.
-        verdict: Which method is best, and how sure that is.
+        verdict: Which method is best, and how certain that is.
         rows: The numbers of the chart and of the short table, one entry per method.
         notes: What a reader must know beside them.
         tables: All tables by name.
@@ -82,7 +82,7 @@ def chapter(
     said: Verdict,
     recorded: Sequence[dict[str, Any]],
 ) -> Chapter:
-    """Gather what the page says about a section.
+    """Make the chapter of a section.
 
     Args:
         number: Its place in the page, from 1 on.

@@ -1,4 +1,4 @@
-"""How columns are headed and their numbers written, in HTML and in LaTeX alike."""
+"""Headings and number formats of tables, the same in HTML and in LaTeX."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Table:
     Attributes:
         data: One row per method or value.
         columns: What is shown, in order; `data` holds all of them.
-        apart: Rows that are references, set apart.
+        apart: Rows of references, which follow after a rule.
         title: Caption.
     """
 
@@ -159,5 +159,5 @@ class Table:
 
 
 def _escaped(text: str) -> str:
-    """Text in which no sign has a meaning in LaTeX."""
+    """Text with LaTeX's special characters escaped."""
     return "".join(LATEX_SIGNS.get(sign, sign) for sign in text)

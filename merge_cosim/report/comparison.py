@@ -132,7 +132,7 @@ def _row(part: pd.DataFrame) -> dict[str, Any]:
 
 
 def _differences(folders: list[ResultFolder], frames: list[pd.DataFrame], every: bool) -> list[str]:
-    """What a reader must know before trusting the comparison, one line each."""
+    """Differences between the two sweeps that make the comparison less certain, one line each."""
     lines = []
     manifests = [folder.read_json(MANIFEST) for folder in folders]
     for name in ("versions", "seed", "models", "settings", "plugins", "ramps", "scenarios"):

@@ -69,7 +69,7 @@ def check_file(option: str, file: str | Path, kinds: tuple[str, ...]) -> None:
         kinds: The suffixes that there are.
 
     Raises:
-        UserError: It is so.
+        UserError: The file has another suffix, or there is no encoder.
     """
     suffix = Path(file).suffix.lower()
     if suffix not in kinds:
@@ -140,7 +140,7 @@ class Film:
         return {int(cycle): corners[cycles == cycle] for cycle in np.unique(cycles)}
 
     def stills(self, count: int) -> Iterator[Figure]:
-        """So many frames, evenly over the case, with the last one."""
+        """A number of frames at equal distances over the case, the last one included."""
         for number in np.linspace(0, len(self) - 1, count).round().astype(int):
             with style():
                 frame = _Frame(self._road)
@@ -235,7 +235,7 @@ class _Frame:
         return bar
 
     def cars(self, poses: list[tuple[FloatArray, float]], lengths: tuple[float, float]) -> None:
-        """Put the cars, host first, by their centres and headings; the window goes along with the host."""
+        """Move the cars, host first, to their centres and headings, and the window with the host."""
         self._axes.set_xlim(poses[0][0][0] - BEHIND, poses[0][0][0] + AHEAD)
         for (centre, heading), length, body, name, side in zip(
             poses, lengths, self._bodies, self._names, (1.0, -1.0), strict=True

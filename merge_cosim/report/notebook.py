@@ -43,7 +43,7 @@ def tables_html(tables: Sequence[ShortTable]) -> str:
 
 
 def pairs_html(pairs: Sequence[tuple[str, str]]) -> str:
-    """A table of names and what is said of each."""
+    """A table with a name and a text per row."""
     left = 'style="text-align:left"'
     rows = "".join(
         f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(said)}</td></tr>" for name, said in pairs

@@ -32,13 +32,13 @@ BRIEF_CASES = 3
 
 @dataclass(frozen=True)
 class Report:
-    """What a report says, before it becomes a page or figures.
+    """The content of a report, from which the page and the figures are made.
 
     Attributes:
         manifest: How the results were made.
-        results, summary: The rows of the folder; the summary with what only a reader needs.
+        results, summary: The rows of the folder; the summary with further columns for readers.
         traces, recorded: The recorded cases that the page has room for, as rows and for the viewer.
-        left_out: How many more there are.
+        left_out: Number of recorded cases without room.
         chapters: One for each scenario, site and source.
         variations: A table for each varied parameter.
         contacts, traffic: The tables of collisions and of scenes; None where there is none.
@@ -69,7 +69,7 @@ class Report:
 
 
 def read_report(folder: Path, against: str | None = None) -> Report:
-    """Gather what a report says about a result folder.
+    """Read the content of a report from a result folder.
 
     Args:
         folder: The result folder.
@@ -123,8 +123,8 @@ def report_page(report: Report, note_lines: Sequence[str] = (), brief: bool = Fa
     """The page of a report.
 
     Args:
-        report: What it says.
-        note_lines: What was noted in living traffic.
+        report: Its content.
+        note_lines: Notes on the results, such as events in living traffic.
         brief: The charts alone, with no more than `BRIEF_CASES` recorded cases of each chapter, for a notebook.
     """
     recorded = report.recorded

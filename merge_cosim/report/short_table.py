@@ -55,7 +55,7 @@ TRAFFIC = (
 )
 """What is shown of the traffic as a whole; `--wide` shows all that there is."""
 IN_TITLE = {"n": "cases each: {}", "scenes": "scenes each: {}", "stuck": "stuck: {}", "variation": "{}"}
-"""How the title says what is the same in all rows."""
+"""How the title names what is the same in all rows."""
 LESS_IS_BETTER = ("failure_pct", "stuck", "failed_or_stuck_pct", "delay_s")
 COMPARED = (
     *("variation", "method", "n", "failure_pct_a", "failure_pct_b", "only_a", "only_b", "p"),

@@ -1,4 +1,4 @@
-"""Files of a result folder: read with one clear line where one is damaged, written whole or not at all."""
+"""Files of a result folder: a damaged one is reported in one line, and files are replaced as a whole."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from merge_cosim.core.errors import UserError
 
 
 class _Object(dict[str, Any]):
-    """An object of a JSON file: a key that is looked for and not there is a damage of the file."""
+    """An object of a JSON file; a missing key is reported as a damaged file."""
 
     def of(self, file: Path) -> Self:
         """Name the file that it comes from."""
@@ -48,7 +48,7 @@ def csv_table(file: Path, **options: Any) -> pd.DataFrame:
 
 @contextmanager
 def readable(file: Path) -> Iterator[None]:
-    """Reading and taking apart a text of the folder: what goes wrong is a damage of the file."""
+    """Context for reading and parsing a text of the folder; an error in it is reported as a damaged file."""
     try:
         yield
     except FileNotFoundError:
@@ -67,7 +67,7 @@ def is_whole(file: Path) -> bool:
 
 
 def require(file: Path, held: pa.Schema, expected: Iterable[pa.Field]) -> None:
-    """Refuse a table that lacks a column, has it twice, or with values of another type.
+    """Refuse a table in which a column is missing, is there twice or has another type.
 
     Raises:
         UserError: It does.

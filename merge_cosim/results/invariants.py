@@ -21,7 +21,7 @@ _CONTACT = (*_NAMES, "failed", "sumo_collision", "host_reached_s", "merging_reac
 
 
 def checked(run: Run, rows: pa.Table) -> Checked:
-    """What the invariants of a run came to.
+    """The invariants of a run: how many encounters broke each.
 
     Args:
         run: The run.
@@ -42,7 +42,7 @@ def checked(run: Run, rows: pa.Table) -> Checked:
 
 
 def joined(parts: Iterable[Checked]) -> dict[str, Any]:
-    """The same of several runs, with every invariant counted; no order of them matters."""
+    """The same of several runs, with every invariant counted; their order does not matter."""
     total: dict[str, Any] = {"encounters": 0, "broken": dict.fromkeys(INVARIANTS, 0), "first": {}}
     for part in parts:
         total["encounters"] += part["encounters"]

@@ -154,8 +154,8 @@ def _earlier(first: FloatArray, second: FloatArray) -> BoolArray:
 def post_encroachment(c: Mapping[str, AnyArray], encounters: Encounters, dt: float) -> FloatArray:
     """Post-encroachment time [s]: from the first car's rear clearing the merging point to the second's front there.
 
-    Where the run ended before the rear was through, it goes on at the first car's last speed, which makes the time
-    negative. NaN where a front never arrives, or the first car was through from the start, or stands on the point.
+    Where the run ended before the rear had passed, the first car goes on at its last speed, which makes the time
+    negative. NaN where a front never arrives, or the first car had passed at the start, or stands on the point.
     """
     host = np.where(encounters.host_station >= 0, -np.inf, c["host_reached_s"])
     merging = np.where(encounters.merging_station >= 0, -np.inf, c["merging_reached_s"])

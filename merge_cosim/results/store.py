@@ -1,4 +1,4 @@
-"""A result folder: parts while a sweep runs, one sorted file, a summary and a manifest when it is done."""
+"""A result folder: parts while a sweep runs; afterwards one sorted file, a summary and a manifest."""
 
 from __future__ import annotations
 
@@ -97,12 +97,12 @@ class ResultFolder:
         """Make ready for a sweep; parts of an interrupted one are kept if it was the same and is to be resumed.
 
         Args:
-            plan: What makes it the same sweep.
+            plan: The identity of the sweep.
             resume: Go on with an unfinished one.
             overwrite: Replace a finished one and, without `resume`, an unfinished one.
 
         Raises:
-            UserError: There is a sweep and nothing says what to do with it, or it is another one than the one to go on.
+            UserError: There is a sweep and neither option is set, or the sweep to resume is another one.
         """
         if self.path.exists() and not self.path.is_dir():
             raise UserError(f"{self.path}: is a file; --out names a folder")
@@ -139,7 +139,7 @@ class ResultFolder:
         """Make ready for adding to a finished sweep: its rows and its facts of scenes become parts.
 
         Args:
-            plan: What the sweep will be afterwards.
+            plan: The identity of the sweep with what is added.
             drop: A method whose rows are left out, as they are made anew from the others.
 
         Raises:
@@ -271,7 +271,7 @@ class ResultFolder:
         return [fact | {"notes": notes.get(tuple(fact[name] for name in OF_SCENE), [])} for fact in facts]
 
     def note_lines(self) -> list[str]:
-        """What the user should know of the results: a line for each broken invariant, event in scenes, and model."""
+        """Notes on the results: a line for each broken invariant, event in scenes, and model."""
         return [*lines(self._invariants()), *self._scene_notes(), *self._support_notes()]
 
     def _support_notes(self) -> list[str]:
@@ -407,7 +407,7 @@ class ResultFolder:
         write_text(self.path / name, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
     def finish(self) -> None:
-        """Take the parts away, once everything is written."""
+        """Remove the parts, once everything is written."""
         for file in [*self._parts.glob("*.parquet"), self._plan]:
             file.unlink()
         self._parts.rmdir()
@@ -422,7 +422,7 @@ class ResultFolder:
         return read_table(self.path / RESULTS, columns)
 
     def check(self) -> None:
-        """See that the rows of a finished sweep are here, and can be understood; none of them is read.
+        """Check that the rows of a finished sweep are there and of this version, without reading them.
 
         Raises:
             UserError: See `results`.
@@ -455,7 +455,7 @@ def with_facts(rows: pa.Table, facts: list[dict[str, Any]], invariants: Checked)
 
 
 def _completed(rows: pa.Table, more: Callable[[pa.Table], pa.Table] | None) -> pa.Table:
-    """Rows of whole cases along with those made of them, sorted."""
+    """Rows of whole cases with further rows that are made from them, sorted."""
     every = rows if more is None else pa.concat_tables([rows, more(rows)])
     return every.sort_by(KEY).replace_schema_metadata(SCHEMA.metadata)
 

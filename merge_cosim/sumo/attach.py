@@ -31,7 +31,7 @@ class Address:
         """Read `HOST:PORT`.
 
         Raises:
-            UserError: It is something else.
+            UserError: It is not of this form.
         """
         host, _, port = text.rpartition(":")
         if not host or not port.isascii() or not port.isdigit() or not 0 < int(port) < 65536:
@@ -53,7 +53,7 @@ class AttachedSession(Session):
             address: Where it listens.
 
         Raises:
-            UserError: Nothing listens there, or SUMO runs under other conditions.
+            UserError: No SUMO listens there, or it was started with other options.
         """
         traci = own_traci()
         errors = (traci.TraCIException, traci.FatalTraCIError)
@@ -95,7 +95,7 @@ class AttachedSession(Session):
 
 
 def other_net(session: Session, net: Path, edges: set[str]) -> str:
-    """What is amiss with the net that SUMO runs on, if these edges are not as in ours: stations would be wrong."""
+    """A line that says how the net of SUMO differs from ours, if these edges differ: stations would be wrong."""
     running, ours = set(session.lanes()), read_net(net)
     for lane in (lane for edge in sorted(edges) for lane in ours.getEdge(edge).getLanes()):
         name, length = lane.getID(), lane.getLength()

@@ -64,7 +64,7 @@ class RowArrays:
         return found
 
     def clusters(self) -> AnyArray:
-        """What rows belong together: those of one merging car; of cases that are not logged, each stands alone."""
+        """The cluster of each row: its merging car; where that is not logged, its case."""
         return np.where(self.logged, self.car_names[self.car], self.case_names[self.case])
 
     def outcomes(self) -> IntArray:

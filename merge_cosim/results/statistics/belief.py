@@ -26,8 +26,8 @@ BINS = 10
 def belief(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per group, start (all, and by ambiguity) and gate; empty where no case has a label.
 
-    `n` cases have a label and pass the gate undecided. A rule without doubt has an accuracy alone; `auc_arrival` is the
-    AUC of T_h - T_m at the same gates of the same runs, and so how much the geometry alone decides there.
+    `n` cases have a label and pass the gate undecided. A rule without probabilities has an accuracy only; `auc_arrival`
+    is the AUC of T_h - T_m at the same gates of the same runs, and so how much the geometry alone decides there.
     """
     found = []
     for key, start, group in _groups(rows):

@@ -1,4 +1,4 @@
-"""Two methods on the same cases: which of them fails alone, and a paired test."""
+"""Two methods on the same cases: on which only one of them fails, and a paired test."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def compare(own: pd.DataFrame, other: pd.DataFrame, against: str | None, is_samp
         own: Rows of one method, one per case.
         other: Rows of the method `against` on the same cases.
         against: Its name; None if there is none.
-        is_sample: The cases are a sample, so that there is a p value; a fixed grid has counts alone.
+        is_sample: The cases are a sample, so that there is a p value; a fixed grid has only counts.
     """
     if against is None or not len(other) or (own["method"] == against).all():
         return not_compared(against)
@@ -79,5 +79,5 @@ def judged(cases: pd.DataFrame, against: str, is_sample: bool) -> dict[str, Any]
 
 
 def clusters_of(rows: pd.DataFrame) -> pd.Series:
-    """What rows belong together: those of one merging car; of cases that are not logged, each stands alone."""
+    """The cluster of each row: its merging car; where that is not logged, its case."""
     return rows["car"].where(rows["car"] != "", rows["case"])

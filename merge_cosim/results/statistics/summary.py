@@ -65,7 +65,7 @@ D0 = 2.0
 def oracle_best(rows: pa.Table) -> pa.Table:
     """Rows of the better of always-go and always-yield on each case: the one that does not fail, ties by delay.
 
-    It bounds what constant decisions can reach, no more. Empty where one of the two was not run, and in living traffic.
+    It is the best that constant decisions can reach. Empty where one of the two was not run, and in living traffic.
     """
     frame = rows.to_pandas()
     frame = frame[frame["method"].isin(CONSTANT) & (frame["source"] != TRAFFIC)]
@@ -129,7 +129,7 @@ class Summary:
         self._groups: dict[str, dict[tuple[str, ...], Totals]] = {}
 
     def add(self, rows: pd.DataFrame) -> Self:
-        """Take in a batch: all rows of some cases, with the columns `COLUMNS` at least."""
+        """Add a batch: all rows of some cases, with the columns `COLUMNS` at least."""
         frame = rows.assign(
             unnecessary_yield=_unnecessary_yields(rows),
             own=rows["failure_kind"] != "merging_into_host",

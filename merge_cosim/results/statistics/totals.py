@@ -1,4 +1,4 @@
-"""What the rows of a group add up to, batch by batch, so that a summary never needs all rows at once."""
+"""Sums over the rows of a group, batch by batch, so that a summary never needs all rows at once."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from merge_cosim.results.statistics.rates import MOST_CLUSTERS, Interval, Moment
 
 @dataclass
 class Sum:
-    """Number and sum of the values that are known."""
+    """Number and sum of the known values."""
 
     known: int = 0
     total: float = 0.0
 
     def add(self, values: FloatArray) -> None:
-        """Take in the values of a batch; NaN is not known."""
+        """Add the values of a batch; NaN is missing."""
         present = values[~np.isnan(values)]
         self.join(Sum(len(present), float(present.sum())))
 
     def join(self, other: Sum) -> None:
-        """Take in another one."""
+        """Add another one."""
         self.known += other.known
         self.total += other.total
 
     def mean(self, factor: float = 1.0) -> float | None:
-        """Mean of what is known, times a factor."""
+        """Mean of the known values, times a factor."""
         return round(factor * (self.total / self.known), 6) if self.known else None
 
     def count(self) -> int | None:
-        """How many of what is known are true; None where nothing is known."""
+        """How many of the known values are true; None without any."""
         return int(self.total) if self.known else None
 
 
 @dataclass
 class Tail:
-    """A low quantile of what is known, exact: as many of the smallest values are kept as it can need.
+    """A low quantile of the known values, exact: it keeps as many of the smallest values as the quantile can need.
 
     Attributes:
         q: Which quantile.
@@ -54,12 +54,12 @@ class Tail:
     smallest: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def add(self, values: FloatArray, most: int) -> None:
-        """Take in the values of a batch, those that are known; of all batches there will be `most` at most."""
+        """Add the known values of a batch; `most` is the most values that all batches may have."""
         present = values[~np.isnan(values)]
         self.join(Tail(self.q, len(present), present), most)
 
     def join(self, other: Tail, most: int) -> None:
-        """Take in another one."""
+        """Add another one."""
         self.known += other.known
         self.smallest = np.concatenate([self.smallest, other.smallest])
         room = int(self.q * max(most - 1, 0)) + 2
@@ -92,7 +92,7 @@ class Clusters:
     rows: int = 0
 
     def add(self, values: pd.DataFrame, clusters: pd.Series, whole: bool) -> None:
-        """Take in the rows of a batch.
+        """Add the rows of a batch.
 
         Args:
             values: One column per mean.
@@ -109,7 +109,7 @@ class Clusters:
         self.join(Clusters(whole, [(sums, counts)], rows=len(values)))
 
     def join(self, other: Clusters) -> None:
-        """Take in another one."""
+        """Add another one."""
         self.whole &= other.whole
         self.rows += other.rows
         self.parts += other.parts
@@ -152,7 +152,7 @@ def _joined(one: list[Moments] | None, other: list[Moments] | None) -> list[Mome
 
 @dataclass
 class Totals:
-    """What the rows of a group add up to.
+    """Sums over the rows of a group.
 
     Attributes:
         most: Most rows that there will be.
@@ -175,7 +175,7 @@ class Totals:
     compared: bool = False
 
     def join(self, other: Totals) -> None:
-        """Take in another one."""
+        """Add another one."""
         self.numbers.update(other.numbers)
         for name, total in other.sums.items():
             self.sums.setdefault(name, Sum()).join(total)

@@ -25,7 +25,7 @@ NAMED = 4
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is said of one test.
+    """The verdict on one test.
 
     Attributes:
         sentence: One or two sentences in plain text.
@@ -44,7 +44,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class _Count:
-    """What became of one method's cases; of a method with several models, one entry each."""
+    """Counts of one method's cases; a method with several models has an entry per model."""
 
     method: str
     n: int
