@@ -23,7 +23,7 @@ from merge_cosim.results.statistics.rates import wilson
 CORE = {
     "scoring": (
         ["scoring/scoring.py", "scoring/rules.py", "scoring/decisions.py"],
-        ["scoring/test_scoring.py", "scoring/test_measures.py"],
+        [f"scoring/test_{name}.py" for name in ("scoring", "measures", "second_reading", "end_of")],
     ),
     "statistics": (
         ["results/statistics/rates.py", "results/statistics/verdict.py", "results/statistics/summary.py"],

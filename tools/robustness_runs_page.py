@@ -1,9 +1,10 @@
 """Set what the long commands have printed into docs/robustness.md.
 
 python tools/fuzz.py --inputs 100000 --seed 14 > fuzz.json
+python tests/ramps/corpus/drive.py > corpus.json
 python tools/faults.py --faults 300 --seed 14 > faults.json
 python tools/mutation.py --sample 25 > mutation.json
-python tools/robustness_runs_page.py --fuzz fuzz.json --faults faults.json --mutation mutation.json
+python tools/robustness_runs_page.py --fuzz fuzz.json --corpus corpus.json --faults faults.json --mutation mutation.json
 """
 
 import json
@@ -21,10 +22,13 @@ KINDS = ("right", "refused", "wrong", "traceback", "line", "hang", "crash", "pro
 
 def fuzz(runs: Sequence[dict[str, Any]]) -> str:
     """The commands, and what became of each target's inputs in all of them."""
-    commands = [
-        f"python tools/fuzz.py --seed {run['seed']} --first {run.get('first', 0)} --inputs {run['inputs']}"
-        for run in runs
-    ]
+    stretches: list[list[int]] = []  # seed, first input and number of inputs; parts that follow each other are one
+    for seed, first, inputs in sorted((run["seed"], run.get("first", 0), run["inputs"]) for run in runs):
+        if stretches and stretches[-1][0] == seed and sum(stretches[-1][1:]) == first:
+            stretches[-1][2] += inputs
+        else:
+            stretches.append([seed, first, inputs])
+    commands = [f"python tools/fuzz.py --seed {s} --first {first} --inputs {inputs}" for s, first, inputs in stretches]
     counts = {name: Counter[str]() for run in runs for name in run["targets"]}
     for run in runs:
         for name, ends in run["targets"].items():
@@ -35,6 +39,14 @@ def fuzz(runs: Sequence[dict[str, Any]]) -> str:
     rows.append(["**all**", *(f"**{whole[kind]:,}**" for kind in KINDS)])
     text = f"{whole.total():,} inputs."
     return "```\n" + "\n".join(commands) + f"\n```\n\n{text}\n\n{table(['target', *KINDS], rows)}"
+
+
+def ramps(found: dict[str, Any]) -> str:
+    """The command, and how many ramps of the corpus came out right."""
+    text = f"{found['ramps']} ramps: {found['right']} right, {found['refused']} refused with the right reason"
+    wrong = "".join(f"\n- {name}: {end}" for name, end in found["wrong"].items())
+    listed = f", {len(found['wrong'])} wrong:\n{wrong}\n" if wrong else ", none wrong.\n"
+    return f"```\npython tests/ramps/corpus/drive.py\n```\n\n{text}{listed}"
 
 
 def faults(runs: Sequence[dict[str, Any]]) -> str:
@@ -74,6 +86,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = page_parser(__doc__)
     parser.add_argument("--fuzz", type=Path, nargs="+", help="what the commands have printed")
     parser.add_argument("--again", type=Path, nargs="+", help="the same, of inputs that were faults before")
+    parser.add_argument("--corpus", type=Path, help="what the command has printed")
     parser.add_argument("--faults", type=Path, nargs="+", help="what the commands have printed")
     parser.add_argument("--mutation", type=Path, help="what the command has printed")
     given = parser.parse_args(argv)
@@ -81,8 +94,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     for name, shown in (("fuzz", fuzz), ("again", fuzz), ("faults", faults)):
         if files := getattr(given, name):
             made[name] = shown([json.loads(file.read_text()) for file in files])
-    if given.mutation:
-        made["mutation"] = mutation(json.loads(given.mutation.read_text()))
+    for name, shown_one in (("corpus", ramps), ("mutation", mutation)):
+        if file := getattr(given, name):
+            made[name] = shown_one(json.loads(file.read_text()))
     fill_page("robustness.md", given.docs, {"runs": made.get})
 
 

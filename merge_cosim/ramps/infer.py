@@ -79,7 +79,7 @@ def joints(net: sumolib.net.Net) -> list[Joint]:
 
     A net with OpenStreetMap's types: a link that joins a motorway or trunk road, beside another edge. Any other net: an
     edge that joins a road of at least as many lanes and at least the same speed limit, one of them greater. Either must
-    join at an acute angle and be open to cars.
+    join at `MAX_ANGLE` or less and be open to cars.
     """
     typed = any(is_link(edge) or edge.getType().startswith(OSM) for edge in net.getEdges())
     found = []
@@ -174,7 +174,7 @@ def _why_main(joint: Joint, joining: tuple[Edge, ...], leaving: tuple[Edge, ...]
 
 
 def _arriving(gore: Edge) -> list[Edge]:
-    """Edges open to cars that lead to another at an acute angle."""
+    """Edges open to cars that lead to another at `MAX_ANGLE` or less."""
     return [edge for edge in gore.getIncoming() if has_cars(edge) and _angle(edge, gore) <= MAX_ANGLE + ANGLE_TOLERANCE]
 
 

@@ -226,6 +226,19 @@ def test_longer_approaches_are_expected_to_last_longer():
     assert encounters.host_station[nearest] > np.min(encounters.host_station)
 
 
+def test_the_length_of_a_case_is_that_of_the_later_car_at_1_m_s2_and_the_horizon():
+    encounters = random_encounters(20, seed=8)
+    cars = (
+        (encounters.host_station, encounters.host_speed),
+        (encounters.merging_station, encounters.merging_speed),
+    )
+    for rules in (Rules(), Rules(time_out=6.0)):
+        for n, cycles in enumerate(expected_cycles(encounters, rules)):
+            # The time t in which a car covers its way: way = speed t + t^2 / 2.
+            times = [max(np.roots([0.5, speed[n], min(station[n], 0.0)]).real) for station, speed in cars]
+            assert cycles == pytest.approx(10 * min(max(times) + 3.0, rules.time_out))
+
+
 def test_nothing_to_score_gives_no_rows():
     encounters = random_encounters(3, seed=9)
     tracks = Tracks.of(encounters, [], [])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.ramps.check import STAND_INS
 from merge_cosim.ramps.create.folder import require_new, write_ramp
 from merge_cosim.ramps.create.layout import Layout, lay_out
 from merge_cosim.ramps.create.new import RampNumbers, default_merging_point
@@ -39,7 +40,7 @@ def ramp_from_net(
         origin: What the net was made from, if it is not the user's own.
 
     Raises:
-        UserError: The file is no net, or has no on-ramp, or several and `link` is not given.
+        UserError: The file is no net, or has no on-ramp, or several and `link` is not given, or no speed limit.
     """
     require_new(folder)
     origin = origin or Origin(net_file)
@@ -53,6 +54,11 @@ def ramp_from_net(
         raise UserError(f"{origin.file}: the acceleration lane is too long for the road; give --downstream {after:.0f}")
     layout = lay_out(path, upstream, downstream)
     limit = speed_limit or float(layout.main[layout.gore].lane.getSpeed())
+    if speed_limit is None and (stand_in := STAND_INS.get(round(limit, 2))):
+        road = layout.main[layout.gore].edge.getID()
+        raise UserError(
+            f"{origin.file}: no speed limit for '{road}': {limit:.2f} m/s is {stand_in}; give one with --speed-limit"
+        )
     left = any(keeps_left(road.edge) for road in layout.roads)
     plain = PlainXml(net, path, layout, limit, raised=speed_limit is None)
     definition = _definition(folder.name, joint, path, layout, limit, origin, given=speed_limit is not None)

@@ -13,7 +13,7 @@ from lxml import etree
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.xml_file import root_element
 from merge_cosim.ramps.create.new import merging_point_source
-from merge_cosim.ramps.infer import Course, Joint, course, joint_of, joints
+from merge_cosim.ramps.infer import MAX_ANGLE, Course, Joint, course, joint_of, joints
 from merge_cosim.ramps.ramp import parsed_net
 
 
@@ -97,7 +97,8 @@ def _listed(net: sumolib.net.Net, upstream: float, downstream: float) -> str:
     if not shown:
         return (
             "no on-ramp found: no edge of type motorway_link or trunk_link (or, in a net without such types, of fewer "
-            "lanes or a lower limit) joins a main road at an acute angle; name the on-ramp's last edge with --link"
+            f"lanes or a lower limit) joins a main road at {MAX_ANGLE:g} degrees or less; name the on-ramp's last edge "
+            "with --link"
         )
     many = f"{len(shown)} on-ramps; choose one" if len(shown) > 1 else "the one on-ramp is chosen"
     return f"{many} with --link: {', '.join(shown)}"

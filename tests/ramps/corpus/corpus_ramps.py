@@ -26,6 +26,7 @@ class Case:
         from_left: How many lanes lie left of the host's after the gore.
         lane: Whether there is an acceleration lane.
         numbers: More arguments for `ramp new`.
+        refused: What the line says with which the ramp is refused; empty if it is taken.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Case:
     from_left: int
     lane: bool = True
     numbers: Mapping[str, object] | None = None
+    refused: str = ""
 
 
 def road(
@@ -62,12 +64,16 @@ def osm(
     from_left: int,
     lane: bool = True,
     signals: Sequence[Point] = (),
+    deleted: Sequence[int] = (),
+    at: Point = (sources.LATITUDE, sources.LONGITUDE),
+    refused: str = "",
     **numbers: object,
 ) -> Case:
+    def make(folder: Path) -> Path:
+        return sources.osm(folder, ways, signals, deleted, at)
+
     numbers.setdefault("link", ramp.split()[-1])
-    return Case(
-        name, lambda folder: sources.osm(folder, ways, signals), main.split(), ramp.split(), from_left, lane, numbers
-    )
+    return Case(name, make, main.split(), ramp.split(), from_left, lane, numbers, refused)
 
 
 def exit_at(x: float, **tags: str) -> tuple[Sequence[Point], Mapping[str, str]]:
@@ -273,6 +279,195 @@ OSM = [
         "9",
         1,
     ),
+    osm(
+        "two links become one",
+        {
+            **main(0, 250, lanes=(2, 3, 2)),
+            7: link((-600.0, -160.0), (-400.0, -80.0), ON),
+            8: link(IN, ON),
+            9: link(ON, GORE),
+        },
+        "1 2 3",
+        "8 9",
+        1,
+    ),
+    osm(
+        "both carriageways",
+        {
+            **main(0, 250, lanes=(2, 3, 2)),
+            9: RAMP,
+            11: road((END, 30.0), (0.0, 30.0)),
+            12: road((0.0, 30.0), (FAR, 30.0)),
+            19: link((600.0, 120.0), (200.0, 50.0), (0.0, 30.0)),
+        },
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "bridge within the lane",
+        {**main(0, 120, 250, lanes=(2, 3, 3, 2))}
+        | {3: road((120.0, 0.0), (250.0, 0.0), lanes=3, bridge="yes", layer="1"), 9: RAMP},
+        "1 2 4",  # netconvert joins 2 and 3, which differ in nothing that it knows
+        "9",
+        1,
+    ),
+    osm(
+        "bus lane on the left",
+        {
+            1: road((FAR, 0.0), GORE, lanes=3, bus_lanes="designated||", access_lanes="no||"),
+            2: road(GORE, (250.0, 0.0), lanes=4, bus_lanes="designated|||", access_lanes="no|||"),
+            3: road((250.0, 0.0), (END, 0.0), lanes=3, bus_lanes="designated||", access_lanes="no||"),
+            9: RAMP,
+        },
+        "1 2 3",
+        "9",
+        2,
+    ),
+    osm(
+        "turn lanes tagged",
+        {**main(0, 250, lanes=(2, 3, 2))}
+        | {2: road(GORE, (250.0, 0.0), lanes=3, turn_lanes="through|through|merge_to_left"), 9: RAMP},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "link drawn against its direction",
+        {**main(0, 250, lanes=(2, 3, 2)), 9: link(GORE, ON, IN, oneway="-1")},
+        "1 2 3",
+        "9",
+        1,
+        link=None,
+    ),
+    osm(
+        "without numbers of lanes",
+        {
+            1: ([(FAR, 0.0), GORE], {"highway": "motorway", "maxspeed": "120"}),
+            2: ([GORE, (END, 0.0)], {"highway": "motorway", "maxspeed": "120"}),
+            9: ([IN, ON, GORE], {"highway": "motorway_link"}),
+        },
+        "1 2",
+        "9",
+        1,
+    ),
+    osm(
+        "name changes at the gore",
+        {**main(0, 250, lanes=(2, 3, 2), name="B", ref="A 2")}
+        | {1: road((FAR, 0.0), GORE, name="A", ref="A 1"), 9: RAMP},
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "fork into two motorways",
+        {
+            **main(0, 250, 900, lanes=(4, 5, 4, 2), name="A1"),
+            9: RAMP,
+            8: road((900.0, 0.0), (1200.0, -60.0), (END, -400.0), lanes=2, name="A2"),
+        },
+        "1 2 3 8",
+        "9",
+        3,
+    ),
+    osm(
+        "link narrows to one lane",
+        {**main(0, 250, lanes=(2, 3, 2)), 8: link(IN, ON, lanes=2), 9: link(ON, GORE)},
+        "1 2 3",
+        "8 9",
+        1,
+    ),
+    osm(
+        "60 degrees",
+        {**main(0, 250, lanes=(2, 3, 2)), 9: link((-300.0, -520.0), GORE)},
+        "1",
+        "9",
+        0,
+        refused="45 degrees or less",
+        link=None,
+    ),
+    osm(
+        "limit by signs that change",
+        {**main(0, 250, lanes=(2, 3, 2), maxspeed="signals"), 9: RAMP},
+        "1",
+        "9",
+        0,
+        refused="--speed-limit",
+    ),
+    osm(
+        "limit by law alone",
+        {**main(0, 250, lanes=(2, 3, 2), maxspeed="DE:motorway"), 9: RAMP},
+        "1",
+        "9",
+        0,
+        refused="--speed-limit",
+    ),
+    osm("limit with its unit", {**main(0, 250, lanes=(2, 3, 2), maxspeed="120 km/h"), 9: RAMP}, "1 2 3", "9", 1),
+    osm(
+        "left-hand traffic in the south",
+        {**main(0, 250, lanes=(2, 3, 2)), 9: link((-600.0, 90.0), (-200.0, 20.0), GORE)},
+        "1 2 3",
+        "9",
+        1,
+        at=(-33.9, 151.0),
+    ),
+    osm(
+        "deleted in an editor",
+        {**main(0, 250, lanes=(2, 3, 2)), 9: RAMP, 8: link((-700.0, -60.0), (-300.0, -40.0), GORE)},
+        "1 2 3",
+        "9",
+        1,
+        deleted=[8],
+        link=None,
+    ),
+    osm(
+        "map ends 400 m after",
+        {
+            1: road((FAR, 0.0), GORE),
+            2: road(GORE, (250.0, 0.0), lanes=3),
+            3: road((250.0, 0.0), (400.0, 0.0)),
+            9: RAMP,
+        },
+        "1 2 3",
+        "9",
+        1,
+    ),
+    osm(
+        "lane drawn as a link",
+        {**main(300), 9: link(IN, ON, (0.0, -6.0), (240.0, -6.0), (300.0, 0.0))},
+        "1 2",
+        "9",
+        1,
+    ),
+    osm(
+        "exit-only lane before",
+        {
+            **main(-500, 0, 250, lanes=(3, 2, 3, 2)),
+            9: RAMP,
+            8: link((-500.0, 0.0), (-350.0, -40.0), (-250.0, -160.0)),
+        },
+        "1 2 3 4",
+        "9",
+        1,
+    ),
+    osm(
+        "exit on the left after",
+        {**main(0, 250, 800, lanes=(2, 3, 2, 2)), 9: RAMP, 8: link((800.0, 0.0), (950.0, 15.0), (1300.0, 120.0))},
+        "1 2 3 4",
+        "9",
+        1,
+    ),
+    osm(
+        "another on-ramp beside the lane",
+        {
+            **main(0, 150, 400, lanes=(2, 3, 4, 2)),
+            9: RAMP,
+            8: link((-250.0, -120.0), (50.0, -30.0), (150.0, 0.0)),
+        },
+        "1 2 3 4",
+        "9",
+        1,
+    ),
     osm("one lane", {**main(0, 250, lanes=(1, 2, 1)), 9: RAMP}, "1 2 3", "9", 0),
     osm("five lanes", {**main(0, 250, lanes=(5, 6, 5)), 9: RAMP}, "1 2 3", "9", 4),
     osm(
@@ -299,12 +494,13 @@ def net(
     connections: Sequence[tuple[str, int, str, int]] = (),
     options: Sequence[str] = (),
     lane: bool = True,
+    refused: str = "",
     **numbers: object,
 ) -> Case:
     def make(folder: Path) -> Path:
         return sources.plain(folder, edges, connections, *options)
 
-    return Case(name, make, main.split(), ramp.split(), from_left, lane, numbers)
+    return Case(name, make, main.split(), ramp.split(), from_left, lane, numbers, refused)
 
 
 def straight(
@@ -455,6 +651,107 @@ NETS = [
         2,
         (),
         ("--default.lanewidth", "3.75"),
+    ),
+    net(
+        "hard shoulder",
+        {
+            name: (points, lanes + (name != "r"), speed, {"shoulder": "emergency"} if name != "r" else {})
+            for name, (points, lanes, speed, _) in straight(0, 300, lanes=(2, 3, 2)).items()
+        },
+        "m0 m1 m2",
+        "r",
+        1,
+        [
+            *(("m0", lane, "m1", lane + (lane > 0)) for lane in range(3)),
+            ("r", 0, "m1", 1),
+            ("m1", 0, "m2", 0),
+            ("m1", 2, "m2", 1),
+            ("m1", 3, "m2", 2),
+        ],
+    ),
+    Case("grid", lambda folder: sources.generated(folder, "--grid"), (), (), 0, refused="no on-ramp found"),
+    Case("spider", lambda folder: sources.generated(folder, "--spider"), (), (), 0, refused="no on-ramp found"),
+    net(
+        "no lanes inside junctions", straight(0, 300, lanes=(2, 3, 2)), "m0 m1 m2", "r", 1, (), ["--no-internal-links"]
+    ),
+    net("lane over two edges", straight(0, 150, 300, lanes=(2, 3, 3, 2)), "m0 m1 m2 m3", "r", 1),
+    net(
+        "opposite direction between the same nodes",
+        straight(0, 300, lanes=(2, 3, 2))
+        | {
+            "-m2": (((END, 0.0), (300.0, 0.0)), 2, 30.0, {}),
+            "-m1": (((300.0, 0.0), GORE), 2, 30.0, {}),
+            "-m0": ((GORE, (FAR, 0.0)), 2, 30.0, {}),
+        },
+        "m0 m1 m2",
+        "r",
+        1,
+        [("m0", 0, "m1", 1), ("m0", 1, "m1", 2), ("r", 0, "m1", 0), ("m1", 1, "m2", 0), ("m1", 2, "m2", 1)],
+    ),
+    net(
+        "lines in the middle of the roads",
+        {
+            name: (points, lanes, speed, {"spreadType": "center"})
+            for name, (points, lanes, speed, _) in straight(0, 300, lanes=(2, 3, 2)).items()
+        },
+        "m0 m1 m2",
+        "r",
+        1,
+    ),
+    net(
+        "far from the origin",
+        straight(0, 300, lanes=(2, 3, 2)),
+        "m0 m1 m2",
+        "r",
+        1,
+        (),
+        ("--offset.x", "4500000", "--offset.y", "-5300000", "--offset.disable-normalization"),
+    ),
+    net(
+        "two-lane on-ramp with a lane straight on",
+        straight(0, 300, lanes=(2, 3, 2)) | {"r": (((-600.0, -90.0), (-200.0, -20.0), GORE), 2, 20.0, {})},
+        "m0 m1 m2",
+        "r",
+        1,
+        [
+            ("m0", 0, "m1", 1),
+            ("m0", 1, "m1", 2),
+            ("r", 0, "m1", 0),
+            ("r", 1, "m1", 1),
+            ("m1", 1, "m2", 0),
+            ("m1", 2, "m2", 1),
+        ],
+        lane=False,
+    ),
+    net(
+        "names with other letters",
+        dict(zip(("Süd#0", "-42", "A1:z", "+r"), straight(0, 300, lanes=(2, 3, 2)).values(), strict=True)),
+        "Süd#0 -42 A1:z",
+        "+r",
+        1,
+    ),
+    net(
+        "on-ramp as fast as the road",
+        straight(0, 300, lanes=(2, 3, 2)) | {"r": (((-600.0, -90.0), (-200.0, -20.0), GORE), 1, 30.0, {})},
+        "m0 m1 m2",
+        "r",
+        1,
+    ),
+    net(
+        "two roads alike",
+        straight(0, 300, lanes=(2, 3, 2)) | {"r": (((-600.0, -90.0), (-200.0, -20.0), GORE), 2, 30.0, {})},
+        "",
+        "",
+        0,
+        refused="no on-ramp found",
+    ),
+    net("lane that goes on", straight(0, lanes=(2, 3)), "", "", 0, refused="goes on"),
+    Case(
+        "OpenDRIVE",
+        lambda folder: sources.opendrive(folder, sources.plain(folder, straight(0, 300, lanes=(2, 3, 2)))),
+        ("-50", "-51", "-52"),  # OpenDRIVE's roads have numbers
+        ("-53",),
+        1,
     ),
 ]
 CORPUS = OSM + NETS

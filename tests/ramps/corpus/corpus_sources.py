@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+import sumolib
+
+from merge_cosim.core.programs import run_program
 from merge_cosim.ramps.build import netconvert
 from merge_cosim.ramps.create.folder import opening
 
@@ -17,20 +20,28 @@ METRES = 111_320.0
 
 
 def osm(
-    folder: Path, ways: Mapping[int, tuple[Sequence[Point], Mapping[str, str]]], signals: Sequence[Point] = ()
+    folder: Path,
+    ways: Mapping[int, tuple[Sequence[Point], Mapping[str, str]]],
+    signals: Sequence[Point] = (),
+    deleted: Sequence[int] = (),
+    at: Point = (LATITUDE, LONGITUDE),
 ) -> Path:
-    """An extract whose ways go through points [m]; ways meet where they share one; `signals` are ramp meters."""
+    """An extract whose ways go through points [m] from `at`; ways meet where they share one.
+
+    `signals` are ramp meters, `deleted` ways that an editor has marked so.
+    """
     numbers: dict[Point, int] = {}
     for points, _ in ways.values():
         for point in points:
             numbers.setdefault(point, len(numbers) + 1)
     rows = []
     for (x, y), number in numbers.items():
-        lat, lon = LATITUDE + y / METRES, LONGITUDE + x / METRES / math.cos(math.radians(LATITUDE))
+        lat, lon = at[0] + y / METRES, at[1] + x / METRES / math.cos(math.radians(at[0]))
         tag = '<tag k="highway" v="traffic_signals"/>' if (x, y) in signals else ""
         rows.append(f'<node id="{number}" lat="{lat:.7f}" lon="{lon:.7f}" version="1">{tag}</node>')
     for way, (points, tags) in ways.items():
-        rows.append(f'<way id="{way}" version="1">')
+        action = ' action="delete"' if way in deleted else ""
+        rows.append(f'<way id="{way}" version="1"{action}>')
         rows += [f'<nd ref="{numbers[point]}"/>' for point in points]
         rows += [f"<tag k={quoteattr(key)} v={quoteattr(value)}/>" for key, value in {"oneway": "yes", **tags}.items()]
         rows.append("</way>")
@@ -56,10 +67,11 @@ def plain(
     rows = []
     for name, (points, lanes, speed, more) in edges.items():
         shape = " ".join(f"{x},{y}" for x, y in points)
-        given = " ".join(f"{key}={quoteattr(value)}" for key, value in more.items())
+        given = " ".join(f"{key}={quoteattr(value)}" for key, value in more.items() if key != "shoulder")
+        inside = f'<lane index="0" allow="{more["shoulder"]}"/>' if "shoulder" in more else ""
         rows.append(
             f'<edge id="{name}" from="{ends[points[0]]}" to="{ends[points[-1]]}" numLanes="{lanes}" speed="{speed}" '
-            f'shape="{shape}" {given}/>'
+            f'shape="{shape}" {given}>{inside}</edge>'
         )
     links = [f'<connection from="{a}" fromLane="{i}" to="{b}" toLane="{j}"/>' for a, i, b, j in connections]
     words: list[str] = []
@@ -73,4 +85,20 @@ def plain(
         words += [flag, str(file)]
     target = folder / "source.net.xml"
     netconvert(target, *words, "-o", str(target), "--no-turnarounds", *options)
+    return target
+
+
+def opendrive(folder: Path, net: Path) -> Path:
+    """A net that was written as OpenDRIVE and read again."""
+    target = folder / "road.xodr"
+    netconvert(net, "-s", str(net), "--opendrive-output", str(target))
+    again = folder / "again.net.xml"
+    netconvert(target, "--opendrive-files", str(target), "-o", str(again))
+    return again
+
+
+def generated(folder: Path, *options: str) -> Path:
+    """A net of netgenerate."""
+    target = folder / "generated.net.xml"
+    run_program([sumolib.checkBinary("netgenerate"), *options, "-o", str(target)], 60.0, target)
     return target

@@ -8,6 +8,7 @@ import pytest
 from command import merge_cosim
 from corpus_ramps import CORPUS, NETS, OSM, Case
 
+from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.check import check
 from merge_cosim.ramps.create.from_net import ramp_from_net
 from merge_cosim.ramps.create.from_osm import ramp_from_osm, read_extract
@@ -22,7 +23,10 @@ def ways(edges: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(re.sub(r"^-|[#-].*$", "", edge) for edge in edges))
 
 
-@pytest.mark.parametrize("case", CORPUS, ids=[case.name for case in CORPUS])
+TAKEN, REFUSED = ([case for case in CORPUS if bool(case.refused) is refused] for refused in (False, True))
+
+
+@pytest.mark.parametrize("case", TAKEN, ids=[case.name for case in TAKEN])
 def test_the_paths_are_the_right_ones(tmp_path: Path, case: Case) -> None:
     numbers = case.numbers or {}
     file = case.make(tmp_path)
@@ -38,6 +42,13 @@ def test_the_paths_are_the_right_ones(tmp_path: Path, case: Case) -> None:
     assert host.getEdge().getLaneNumber() - 1 - host.getIndex() == case.from_left, path.reasons
     assert bool(path.beside) == case.lane
     assert all(lane.allows("passenger") for lane in (*path.main, *path.ramp))
+
+
+@pytest.mark.parametrize("case", REFUSED, ids=[case.name for case in REFUSED])
+def test_it_is_refused_with_the_reason(tmp_path: Path, case: Case) -> None:
+    make = ramp_from_net if case in NETS else ramp_from_osm
+    with pytest.raises(UserError, match=case.refused):
+        make(tmp_path / "mine", case.make(tmp_path), **(case.numbers or {}))
 
 
 @pytest.mark.parametrize("name", DRIVEN)
