@@ -1,4 +1,4 @@
-"""Taking a file in blocks: a few blocks at a time are worked on, and memory does not grow with the file."""
+"""Reading a file in blocks: a few are worked on at a time, so memory does not grow with the file."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -13,10 +13,10 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.ngsim.formats import Source, open_text
 
 BLOCK_BYTES = 1 << 24
-"""Text that is taken from a file at once [bytes]."""
+"""Text that is read from a file at once [bytes]."""
 
 BLOCK_ROWS = 1 << 18
-"""Parquet rows that are taken at once."""
+"""Parquet rows that are read at once."""
 
 THREADS = 2
 """Blocks that are worked on at the same time; more hardly help, and each holds a block in memory."""
@@ -30,7 +30,7 @@ def map_blocks(source: Source, columns: list[str], work: Callable[[pa.Table, int
 
     Args:
         source: The file.
-        columns: The columns to take, as the file spells them; a text's come as texts.
+        columns: The columns to read, as the file spells them; those of a text file are texts.
         work: Called with a block and the number of its first row: line of a text, row of a Parquet file, from 1.
 
     Raises:
@@ -85,7 +85,7 @@ def _text_blocks(source: Source) -> Iterator[_Block]:
 
 
 def _is_text(block: bytes) -> bool:
-    """Whether bytes are UTF-8; of others pyarrow cannot hand over a row."""
+    """Whether bytes are UTF-8; pyarrow returns no rows of other bytes."""
     try:
         return block.isascii() or bool(block.decode())
     except UnicodeDecodeError:

@@ -24,7 +24,7 @@ _NOT_LOGGED = ("nan", "null", "none", "na")
 
 @dataclass(frozen=True)
 class Place:
-    """Where the rows of a piece of a file stand in it.
+    """Line numbers of the rows of a piece of a file.
 
     Attributes:
         source: The file.
@@ -41,7 +41,7 @@ class Place:
 
 
 def numbers(cells: pa.ChunkedArray, column: str, place: Place, optional: bool = False) -> FloatArray:
-    """Return a column's cells as numbers; thousands may be set apart by commas.
+    """Return a column's cells as numbers; thousands may be separated by commas.
 
     Args:
         cells: Texts or numbers, shape (n,).
@@ -88,7 +88,7 @@ def checked(cells: pa.ChunkedArray, column: str, name: str, place: Place) -> Flo
 
 
 def _parse(cells: pa.ChunkedArray, column: str, place: Place) -> pa.ChunkedArray:
-    """Read texts with thousands set apart, blanks around them, or nothing in them."""
+    """Parse texts that may have separated thousands, blanks around them, or be empty."""
     text = pc.utf8_trim_whitespace(cells)
     good = pc.match_substring_regex(text, _NUMBER)
     empty = pc.is_in(pc.utf8_lower(text), pa.array(["", *_NOT_LOGGED]))

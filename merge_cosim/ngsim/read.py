@@ -18,7 +18,7 @@ from merge_cosim.ngsim.table import SCHEMA, ClockError, Repeats, canonical, name
 
 @dataclass(frozen=True)
 class Reading:
-    """What a file gave.
+    """The content of a file.
 
     Attributes:
         tables: The canonical table of each site (by name) that has rows in it.
@@ -57,7 +57,7 @@ def read_file(path: Path, assumed: Site | None = None) -> Reading:
 
 
 def merge(readings: Iterable[Reading]) -> Reading:
-    """Join what several files gave; a row that stands in two of them is kept once."""
+    """Join the content of several files; a row that is in two of them is kept once."""
     tables: dict[str, list[pa.Table]] = defaultdict(list)
     rows, elsewhere, repeats = 0, Counter[str](), Repeats()
     for reading in readings:

@@ -1,4 +1,4 @@
-"""Recordings of another frame rate than 10 Hz, resampled; and those whose tracks begin badly, cut."""
+"""Recordings of another frame rate than 10 Hz, resampled; and the first rows of tracks left out."""
 
 import math
 from itertools import pairwise
@@ -10,7 +10,7 @@ from merge_cosim.core.units import DT, TOLERANCE, IntArray
 from merge_cosim.ngsim.table import SCHEMA
 
 LINEAR = ("x", "speed")
-"""Columns between whose frames a straight line is drawn; all others but `y` keep the value of the frame before."""
+"""Columns that are interpolated linearly; all others but `y` keep the value of the frame before."""
 
 
 def without_first(table: pa.Table, count: int) -> pa.Table:

@@ -147,7 +147,9 @@ def _recording(raw: pa.Table, frame: FloatArray, place: Place) -> pa.Array:
     column = place.source.find(CLOCK)
     assert column is not None
     origin = numbers(raw[column], column, place) - FRAME_MS * frame
-    return pa.array(np.clip(origin, -1.0, LATEST_MS + 1.0).astype(np.int64))  # what is no time stays none
+    return pa.array(
+        np.clip(origin, -1.0, LATEST_MS + 1.0).astype(np.int64)
+    )  # values that are no times stay outside the range
 
 
 def _texts(raw: pa.Table, column: str) -> pa.DictionaryArray:

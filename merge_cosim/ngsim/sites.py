@@ -28,7 +28,7 @@ _Lanes = tuple[int, ...]
 
 
 class Lanes(Table):
-    """Which lane numbers of the recording play which part.
+    """The part of each lane number of the recording.
 
     Attributes:
         host: The main lane that cars merge into; several numbers where it changes its number along the road.
@@ -47,7 +47,7 @@ class Lanes(Table):
     def _one_part_each(self) -> Self:
         numbers = (*self.host, *self.ramp, *self.exit, *self.shared)
         if twice := [number for number in numbers if numbers.count(number) > 1]:
-            raise ValueError(f"lane {twice[0]} is named twice; each lane plays one part")
+            raise ValueError(f"lane {twice[0]} is named twice; each lane has one part")
         return self
 
 
@@ -60,8 +60,8 @@ class Recording(Table):
         unit: Unit of lengths, and of speeds per second.
         columns: The file's name of each canonical column (`formats.COLUMNS`).
         rate: Frames per second; other rates than 10 are resampled.
-        skip_first: Frames left out at the start of each car's track, where a tracker is not yet sure.
-        point: What of a car its position along the road is: its `front`, `centre` or `rear`.
+        skip_first: Frames left out at the start of each car's track, where a tracker is not yet accurate.
+        point: The point of a car that its position along the road is of: `front`, `centre` or `rear`.
         smoothed: Positions were smoothed before they were published.
         location: In NGSIM's format: value of the column `Location`.
         global_x, global_y: In NGSIM's format: range of the global coordinates (California State Plane, NAD83, US survey
@@ -105,7 +105,7 @@ class Site(Table):
         name: Name in tables and results; the folder's if the file gives none.
         title: Name for people.
         length: Length of the recorded road [m].
-        lanes: Which lanes count.
+        lanes: The part of each lane.
         recording: How its files are written.
         pairs: Rules of pairing that differ from the defaults.
         sources: Where each fact comes from, in words.
@@ -146,7 +146,7 @@ class Site(Table):
 
     @property
     def source(self) -> Literal["ngsim", "recorded"]:
-        """What its encounters name as their source."""
+        """The value of `source` of its encounters."""
         return "ngsim" if self.recording.format == "ngsim" else "recorded"
 
     @property

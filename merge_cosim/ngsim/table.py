@@ -66,11 +66,11 @@ class Repeats:
 
 
 class ClockError(ValueError):
-    """Global_Time and Frame_ID do not run together."""
+    """Global_Time and Frame_ID do not advance together."""
 
 
 SIMULATED = "surrogate_"
-"""Names of the surrogate's recordings begin so: its files say themselves that no car was filmed."""
+"""Beginning of the names of the surrogate's recordings, by which its files are recognised as simulated."""
 
 
 def name_recordings(origins: IntArray) -> pa.DictionaryArray:

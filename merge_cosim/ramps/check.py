@@ -1,4 +1,4 @@
-"""Say what is wrong with a ramp: one line for each problem, with the file, what is the matter and how to mend it."""
+"""Problems of a ramp: one line for each, with the file, what is wrong and how to mend it."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def check(folder: Path) -> list[str]:
 
 
 def refuse_unsound(folder: Path) -> None:
-    """Refuse a ramp that does not pass `check`; that one passes is kept in the cache for as long as its files stay.
+    """Refuse a ramp that does not pass `check`; a ramp that passes is remembered in the cache until its files change.
 
     Raises:
         UserError: It does not pass; the line names the first problem.
@@ -86,7 +86,7 @@ def _of_encounters(net: sumolib.net.Net, file: RampFile, ramp: Ramp) -> list[str
 
 
 def notes(folder: Path) -> list[str]:
-    """What is good to know of a ramp but no problem, one line each; none for a ramp that cannot be read."""
+    """Notes on a ramp that are no problems, one line each; none for a ramp that cannot be read."""
     try:
         file = read_ramp_file(folder)
         net = read_net(folder / file.net)
@@ -280,7 +280,7 @@ def _lengths(net: sumolib.net.Net, file: RampFile) -> list[str]:
 
 
 def _extensions(file: RampFile) -> list[str]:
-    """Places from which on road was added that cannot be."""
+    """Places that cannot be where added road begins."""
     given = file.extensions
     return [
         f"extensions.{key}: {value:g} m past the gore, but it must be {'positive' if after else 'negative'}"

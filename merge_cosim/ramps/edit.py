@@ -26,7 +26,7 @@ def editor_command(folder: Path) -> list[str]:
 
 
 def open_editor(folder: Path, say: Callable[[str], object]) -> None:
-    """Open a ramp in netedit, say what to do, and wait until the editor is closed.
+    """Open a ramp in netedit, print what to do, and wait until the editor is closed.
 
     Raises:
         UserError: There is no display to open it on, or netedit fails.
@@ -57,7 +57,7 @@ def open_editor(folder: Path, say: Callable[[str], object]) -> None:
 
 
 def take_over_net(folder: Path, since: int) -> bool:
-    """Write the plain XML from a net that was saved after it, for Save Network saves the net alone.
+    """Write the plain XML from a net that was saved after it, for Save Network saves only the net.
 
     Returns whether it had to.
 

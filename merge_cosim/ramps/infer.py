@@ -95,9 +95,9 @@ def joints(net: sumolib.net.Net) -> list[Joint]:
 
 
 def joint_of(net: sumolib.net.Net, link: str) -> Joint:
-    """Where the traffic of an edge joins the main road; the edge may be any of the on-ramp.
+    """Where the traffic of an edge joins the main road; it may be any edge of the on-ramp.
 
-    A way of OpenStreetMap that netconvert has split is meant by its number, too.
+    The number of an OpenStreetMap way names all edges that netconvert has made of it.
 
     Raises:
         UserError: The net has no such edge, or following it leads to no joint.

@@ -24,7 +24,7 @@ LINK = "_link"
 CLASSES = ("tertiary", "secondary", "primary", "trunk", "motorway")
 """Classes of roads, from the least to the greatest."""
 CAR = "passenger"
-"""The vehicle class that must be let in."""
+"""The vehicle class that must be allowed."""
 MAX_TURN = 90.0
 """A road goes on at less than this angle [degrees]; anything else is another road, or the way back."""
 BEYOND = 2000.0
@@ -47,7 +47,7 @@ class Trace:
 
 
 def is_link(edge: Edge) -> bool:
-    """Whether an edge's type, or its name where it has no type, says that it is a link."""
+    """Whether an edge is a link by its type, or by its name where it has no type."""
     return str(edge.getType() or edge.getName() or "").endswith(LINK)
 
 
@@ -57,7 +57,7 @@ def has_cars(edge: Edge) -> bool:
 
 
 def road_class(edge: Edge) -> int:
-    """The greater the more important; 0 for a road of any other kind, -1 for a net's edge without a known type."""
+    """Road class of an edge, higher for more important roads; 0 for any other kind, -1 without a known type."""
     kind = str(edge.getType() or "")
     if not kind.startswith(OSM):
         return -1
@@ -98,7 +98,7 @@ def lanes_into(lane: Lane) -> list[Lane]:
 
 
 def rank(edge: Edge, onward: Edge, like: Edge) -> tuple[bool, int, bool, int, int, float, float]:
-    """How much an edge looks like the main road into (or out of) another: the greater the more.
+    """How likely an edge is the main road into (or out of) another; higher is more likely.
 
     Args:
         edge: The edge before.

@@ -1,4 +1,4 @@
-"""A picture of a ramp, so that a wrong guess is seen at once: both paths, the gore, the merging point."""
+"""A picture of a ramp, so that a wrong guess can be seen: both paths, the gore, the merging point."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ COLORS = {
     "host's lane": colors.HOST,
     "merging car's lane": colors.MERGING,
 }
-"""Of each kind of lane; the later ones are drawn over the earlier."""
+"""Colour of each kind of lane; the later ones are drawn over the earlier."""
 
 
 def draw(folder: Path) -> Path:

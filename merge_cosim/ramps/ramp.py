@@ -1,4 +1,4 @@
-"""A ramp as an encounter sees it: two paths in metres past the gore, and where they lie in the SUMO net.
+"""A ramp as encounters use it: two paths in metres past the gore, and where they lie in the SUMO net.
 
 Coordinates: x [m] runs along the main road and is 0 at the gore; on the on-ramp it is minus the way left to the gore.
 An encounter has its merging point at x = merge_position, and a station is x - merge_position. x is the plain sum of
@@ -238,10 +238,10 @@ def read_net(path: Path) -> sumolib.net.Net:
 
 
 def parsed_net(path: Path, named: Path) -> sumolib.net.Net:
-    """Take a net apart; `named` is the file that error lines speak of.
+    """Parse a net; `named` is the file in error lines.
 
     Raises:
-        UserError: It cannot be, or lacks a junction that an edge names.
+        UserError: It cannot be parsed, or lacks a junction that an edge names.
     """
     try:
         net = sumolib.net.readNet(str(path))

@@ -1,1 +1,1 @@
-"""The only package that knows libsumo and TraCI: sessions, options, vehicle types, routes, configurations, outputs."""
+"""The only package that imports libsumo and TraCI: sessions, options, types, routes, configurations, outputs."""

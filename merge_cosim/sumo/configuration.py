@@ -34,7 +34,7 @@ DEFAULT_TYPE = "DEFAULT_VEHTYPE"
 
 @dataclass(frozen=True)
 class Configuration:
-    """A `.sumocfg`, as far as we need to know it.
+    """The parts of a `.sumocfg` that this package uses.
 
     Attributes:
         file: The file.
@@ -42,7 +42,7 @@ class Configuration:
         routes: Its route files.
         additional: Its additional files.
         begin: Its begin [s].
-        end: Its end [s]; inf if it does not say.
+        end: Its end [s]; inf if it names none.
     """
 
     file: Path
@@ -88,7 +88,7 @@ class Configuration:
         return (self.file, self.net, *self.routes, *self.additional)
 
     def vehicles(self) -> Iterator[etree._Element]:
-        """Everything in the files that puts a vehicle or a person in."""
+        """All elements of the files that put in a vehicle or a person."""
         return self._elements(*DEMAND)
 
     def names_role(self, role: str) -> bool:
@@ -96,7 +96,7 @@ class Configuration:
         return any(one.get("key") == ROLE and one.get("value") == role for one in self._elements("param"))
 
     def hosts(self, host: str) -> tuple[str, ...]:
-        """Ids of the vehicles and flows that are hosts whatever their route: by their role, or `host` by itself."""
+        """Ids of the vehicles and flows that are hosts on any route: by their role, or by the name `host`."""
         types = {kind.get("id") for kind in self._elements("vType") if _is_host(kind)}
         return tuple(
             one.get("id", "")
@@ -105,13 +105,13 @@ class Configuration:
         )
 
     def lengths(self) -> dict[str, float]:
-        """Lengths of the vehicle types that say it [m]."""
+        """Lengths of the vehicle types that have one [m]."""
         return {
             kind.get("id", ""): float(kind.get("length", "")) for kind in self._elements("vType") if kind.get("length")
         }
 
     def departures(self) -> dict[str, float]:
-        """When each vehicle is to depart [s], for those with a time of their own; flows are not in it."""
+        """Departure of each vehicle with a time of its own [s], without flows."""
         found = {}
         for one in self._elements("vehicle", "trip"):
             try:
@@ -121,13 +121,13 @@ class Configuration:
         return found
 
     def require(self, host: str) -> None:
-        """Refuse a host's name that stands nowhere in the files.
+        """Refuse a host's name that is not in the files.
 
         Args:
             host: Id of a vehicle, a flow or a type.
 
         Raises:
-            UserError: It does not, or it is that of several types.
+            UserError: It is not, or it names several types.
         """
         ids = {element.get("id", ""): element.tag for element in self._elements(*DEMAND, *TYPES)}
         if ids.get(host) == "vTypeDistribution":
@@ -150,7 +150,7 @@ class Configuration:
 
 
 def parse(file: Path, parents: tuple[Path, ...] = ()) -> etree._Element:
-    """Root of an XML file, which may be compressed with gzip; files that it includes stand in their places.
+    """Root of an XML file, which may be compressed with gzip; with the content of included files in place.
 
     Args:
         file: The file.
@@ -179,10 +179,10 @@ def _options(file: Path, changed: int, named: str) -> tuple[tuple[str, str], ...
 
     Args:
         file: The configuration.
-        changed: When it was changed last, so that it is read again.
+        changed: Time of its last change, so that a changed file is read again.
         named: What error lines call it.
     """
-    # SUMO runs beside the file, so that relative names come back as they stand there.
+    # SUMO runs in the file's folder, so that relative names stay as they are.
     command = [sumolib.checkBinary("sumo"), "-c", file.name, "--save-configuration", "-"]
     done = run_program(command, READING, Path(named), cwd=file.parent)
     if done.returncode:
@@ -194,7 +194,7 @@ def _options(file: Path, changed: int, named: str) -> tuple[tuple[str, str], ...
 
 
 def _require_ramp(file: Path, net: Path) -> None:
-    """Describe a net that has no `ramp.toml` beside it, and say so; refuse one that is not that of a ramp."""
+    """Describe a net that has no `ramp.toml` beside it, with a line on standard error; refuse a net without a ramp."""
     if not (net.parent / FILE_NAME).is_file():
         try:
             folder = describe_ramp(net)

@@ -28,7 +28,7 @@ HOST_LENGTH = 4.7
 class Demand:
     """The traffic of a scene: how many cars, and SUMO's models.
 
-    Cars come at random intervals (exponential), those of the on-ramp at even ones, as behind a ramp meter. A wave is a
+    Cars come at random (exponential) intervals, those of the on-ramp at equal ones, as behind a ramp meter. A wave is a
     speed sign over the main road past the ramp: it slows all cars there at intervals, and stop-and-go waves run
     upstream.
 
@@ -41,14 +41,14 @@ class Demand:
         hosts: Hosts per hour, in the host lane.
         car_following: SUMO's car-following model.
         lane_changing: SUMO's lane-change model; SL2015 works with sublanes.
-        imperfection: `sigma` of Krauss, of EIDM the same; IDM has none.
+        imperfection: `sigma` of Krauss and of EIDM; IDM has none.
         speed_deviation: Deviation of the drivers' desired speeds, as a share of the limit.
         cooperative: How willing drivers are to make room, 0 to 1 (`lcCooperative`).
         assertive: How small a gap a driver accepts for a necessary lane change (`lcAssertive`).
         ramp_speed: Speed limit of the on-ramp [m/s]; 0 for that of the net.
         wave_every: Time from one wave to the next [s]; 0 for none.
         wave_lasts: How long a wave's sign is on [s].
-        wave_speed: What it shows [m/s].
+        wave_speed: Speed on the sign [m/s].
         copies: Copies of the ramp in the net, each with this demand.
     """
 
@@ -133,7 +133,7 @@ def _drivers(demand: Demand, name: str, parameters: dict[str, str] | None = None
 
 
 def _exit_route(ramp: Ramp) -> tuple[str, ...]:
-    """From the main road over the auxiliary lane to the edge that it alone leads to; empty if there is none."""
+    """From the main road over the auxiliary lane to the edge that only this lane leads to; empty if there is none."""
     if not ramp.changes_lane:
         return ()
     shared = ramp.ramp[-1]

@@ -32,7 +32,7 @@ class RampLane(NamedTuple):
     Attributes:
         copy: Prefix of the copy of the ramp in a net of several; empty in the ramp's own net.
         start: x of its edge's start [m past the gore].
-        part: What it is for an encounter.
+        part: Its part of the ramp.
     """
 
     copy: str
@@ -56,9 +56,9 @@ class _Joint(NamedTuple):
 
 
 class LaneMap:
-    """Knows the lanes of a ramp's two paths. All lanes of an edge share one coordinate x [m past the gore].
+    """The lanes of a ramp's two paths. All lanes of an edge share one coordinate x [m past the gore].
 
-    `lane_map[lane]` is the meaning of a SUMO lane by its id, also in a net of several copies; None off the two paths.
+    `lane_map[lane]` is the `RampLane` of a SUMO lane by its id, also in a net of copies; None off the two paths.
     """
 
     def __init__(self, ramp: Ramp) -> None:
@@ -160,7 +160,7 @@ class LaneMap:
 
 
 class AlongPaths:
-    """x of many cars that drive along the two paths, from their lane positions alone.
+    """x of many cars that drive along the two paths, from their lane positions.
 
     The first half of the rows drive on one of the paths, the second half on the other. Cars never back up, so a lane
     position that has become smaller is on the next edge.
@@ -184,7 +184,7 @@ class AlongPaths:
         self._position[row] = where.position
 
     def x(self, position: FloatArray) -> FloatArray:
-        """Take in the lane positions of all cars after a step, shape (2 count,), and return their x [m]."""
+        """X of all cars [m] from their lane positions after a step, shape (2 count,) both."""
         crossed = np.flatnonzero(position < self._position)
         if len(crossed):
             self._edge[crossed] += 1

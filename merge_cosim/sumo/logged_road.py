@@ -38,7 +38,7 @@ class Strip(NamedTuple):
 
 
 class LoggedRoad:
-    """All strips of a recorded ramp, laid along the road as `ngsim.lanes` in its `ramp.toml` says.
+    """All strips of a recorded ramp, laid along the road by `ngsim.lanes` of its `ramp.toml`.
 
     Attributes:
         strips: Sorted by lane and start.
@@ -55,7 +55,7 @@ class LoggedRoad:
             host_lane: That of the lane that cars merge into.
 
         Raises:
-            UserError: The ramp's file does not say where a recording's lanes lie.
+            UserError: The ramp's file has no table of a recording's lanes.
         """
         if ramp.ngsim is None:
             raise UserError(f"{ramp.net.parent / FILE_NAME}: no [ngsim] table says where logged lanes lie in the net")
@@ -82,7 +82,7 @@ class LoggedRoad:
     def find(self, lane: IntArray, x: FloatArray) -> IntArray:
         """Number of the strip at each place.
 
-        A car that keeps to the side lane beyond its end, where no off-ramp goes on from it, counts for the lane beside.
+        A car in the side lane beyond its end, where no off-ramp goes on from it, counts as in the lane beside it.
 
         Args:
             lane: The recording's lane numbers, those beside the main road with the number of the first on-ramp lane.
@@ -102,7 +102,7 @@ class LoggedRoad:
         return found
 
     def at(self, lane_id: str) -> Strip | None:
-        """The strip that a SUMO lane is; None for one that is none."""
+        """The strip of a SUMO lane; None off all strips."""
         return self._by_id.get(lane_id)
 
     def drivable(self, one: Strip, other: Strip) -> bool:

@@ -1,4 +1,4 @@
-"""SUMO's bit sets that say what a vehicle does by itself beside the commands that it gets.
+"""SUMO's bit sets for what a vehicle does by itself besides the commands that it gets.
 
 Source: SUMO's documentation, page "TraCI/Change Vehicle State", sections "speed mode (0xb3)" and "lane change mode
 (0xb6)".

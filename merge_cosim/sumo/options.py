@@ -1,4 +1,4 @@
-"""SUMO's options: each one's value stands here once, and a profile for each kind of run says which are set."""
+"""SUMO's options: the value of each, and a profile of options for each kind of run."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Options = Mapping[str, str]
 
 STEP: Options = {"step-length": str(DT)}
 NO_TELEPORT: Options = {"time-to-teleport": "-1"}
-"""A vehicle that waits is left where it is."""
+"""A vehicle that waits is never teleported."""
 CONTACTS: Options = {
     "collision.action": "warn",
     "collision.mingap-factor": "0",
     "collision.check-junctions": "false",
 }
-"""A contact is reported where bumpers meet, and the cars are left alone."""
+"""A contact is reported where bumpers meet; SUMO does nothing else about it."""
 NO_INTERNAL_LINKS: Options = {"no-internal-links": "true"}
 """No lanes inside junctions, so that a path is as long as its edges."""
 SILENT: Options = {"no-step-log": "true", "no-warnings": "true"}
@@ -41,7 +41,7 @@ TRAFFIC: Options = {
 }
 """A user's configuration with SUMO's own traffic; teleports are as the configuration has them, and are counted."""
 BACKGROUND: Options = {**STEP, **NO_TELEPORT, "collision.action": "none", **NO_INTERNAL_LINKS, **SILENT}
-"""SUMO's own traffic without anything from outside."""
+"""SUMO's own traffic without commands."""
 WRITTEN: Options = {**NO_TELEPORT, "collision.action": "warn", **NO_INTERNAL_LINKS}
 """The section `processing` of the configurations that are written for users."""
 
@@ -73,7 +73,7 @@ class SumoOptions:
 
     @property
     def conditions(self) -> dict[str, str]:
-        """The options that a SUMO must have been started with to stand in for a run of its own."""
+        """The options that a running SUMO must have been started with to be used in place of one of our own."""
         return {name: self.profile[name] for name in _CONDITIONS if name in self.profile} | dict(NO_INTERNAL_LINKS)
 
     def arguments(self) -> list[str]:

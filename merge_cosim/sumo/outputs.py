@@ -45,7 +45,7 @@ class SumoOutputs:
         """Make the files, empty, with their folders, and return SUMO's options that fill them.
 
         Raises:
-            UserError: Two outputs are to go to one file, or SUMO would not take a name for a file's.
+            UserError: Two outputs are to go to one file, or SUMO would not take one of the names as a file.
             OSError: A file cannot be written.
         """
         options: list[str] = []
@@ -74,11 +74,11 @@ class SumoOutputs:
             options += [option, str(target), *further]
         for target in targets:
             target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(b"")  # SUMO's own complaint would name the net
+            target.write_bytes(b"")  # SUMO's own message would name the net
         return (*options, "--precision", str(DECIMALS)) if options else ()
 
     def check(self) -> None:
-        """Make sure that the files are whole, after the simulation was closed: SUMO says nothing of a full disk.
+        """Make sure that the files are whole, after the simulation was closed: SUMO reports no full disk.
 
         Raises:
             UserError: One is not.

@@ -40,9 +40,9 @@ class _Car:
 
 
 def only_pairs(configuration: Configuration) -> bool:
-    """Whether there is nothing but pairs of a host and a merging car: encounters, and no traffic.
+    """Whether there are only pairs of a host and a merging car, and no other traffic.
 
-    Both start from numbers, and at the same time.
+    Both starts are given in numbers, for the same time.
     """
     entries = [entry for entry in _entries(configuration) if entry.has_start]
     host, merging = ([one.vehicle.get("depart") for one in entries if one.role == role] for role in ROLES)
@@ -56,7 +56,7 @@ def read_sumocfg(file: Path, host: Way = "main") -> tuple[Ramp, Encounters]:
     Its net must be that of a ramp (`ramp.toml` lies beside it). The k-th car with the role `host` meets the k-th with
     the role `merging`, in the order of the route files; their start is given by departure edge, position and speed, as
     numbers. A host's route leads along the main road, a merging car's over the on-ramp, or the other way round where
-    `host` is `ramp`. Other cars are passed over.
+    `host` is `ramp`. Other cars are ignored.
 
     Raises:
         UserError: A file is missing or no XML, or a car cannot be understood or is routed elsewhere.
@@ -65,7 +65,7 @@ def read_sumocfg(file: Path, host: Way = "main") -> tuple[Ramp, Encounters]:
 
 
 def read_pairs(configuration: Configuration, host: Way = "main") -> tuple[Ramp, Encounters]:
-    """The same as `read_sumocfg`, of a configuration that is read already."""
+    """The same as `read_sumocfg` for a configuration that has been read."""
     file = configuration.file
     ramp = Ramp.load(configuration.net.parent)
     cars: dict[str, list[_Car]] = {role: [] for role in ROLES}
@@ -108,7 +108,7 @@ def _stations(ramp: Ramp, role: str, path: Way, cars: list[_Car], merge_position
 
 
 def _start(ramp: Ramp, role: str, path: Way, car: _Car) -> LanePosition:
-    """Where a car starts, after making sure that it drives as its role says."""
+    """Where a car starts; its route is checked against its role."""
     edge, route = car.route[0], ramp.route(path)
     along = route[route.index(edge) :] if edge in route else ()
     if not along or any(mine != theirs for mine, theirs in zip(car.route, along, strict=False)):

@@ -20,8 +20,8 @@ from merge_cosim.sumo.xml import element, number, write_xml
 def write_encounter(folder: Path, ramp: Ramp, encounters: Encounters, row: int, host: Way = "main") -> Path:
     """Write net, ramp, routes and configuration of one encounter into a folder and return the `.sumocfg`.
 
-    The host drives on the path `host`, the other car on the other one. Left alone, SUMO drives both cars by its own
-    models; the initial state is the encounter's.
+    The host drives on the path `host`, the other car on the other one. SUMO's own models drive both
+    cars; the initial state is the encounter's.
 
     Raises:
         UserError: The encounter starts off the net.

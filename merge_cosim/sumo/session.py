@@ -1,4 +1,4 @@
-"""The seam to a running SUMO: the same calls by libsumo in this process or by TraCI to another."""
+"""A running SUMO: the same calls by libsumo in this process or by TraCI to another process."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Session:
         edge, route, kind, length, min_gap: Edge, route, type, length and minimum gap of a vehicle.
         set_length, set_color: Change a vehicle.
         remove: Take a vehicle out.
-        vehicles, vehicle_count: Vehicles in the net.
+        vehicles, vehicle_count: Vehicles in the net, and their number.
         departed, arrived, arrived_count: Vehicles that came in or left in the last step.
         teleporting: Vehicles that began to teleport in it.
         pending: Vehicles that wait outside for room.
@@ -80,7 +80,7 @@ class Session:
     """
 
     def __init__(self, api: Any, errors: Errors = ()) -> None:
-        """Take a running simulation.
+        """Use a running simulation.
 
         Args:
             api: The module libsumo or traci, or a connection of traci.
@@ -166,7 +166,7 @@ class Session:
         self.take_control(car)
 
     def take_control(self, car: str) -> None:
-        """From now on a vehicle drives exactly as commanded, and changes lane on command alone."""
+        """From now on a vehicle drives exactly as commanded, and changes lane only on command."""
         self._api.vehicle.setSpeedMode(car, SpeedMode.UNCHECKED)
         self._api.vehicle.setLaneChangeMode(car, LaneChangeMode.NONE)
 
@@ -244,7 +244,7 @@ class Session:
         self._api.gui.setZoom(_VIEW, _ZOOM)
 
     def show(self, host: str, log_odds: float) -> None:
-        """Show what a host believes and decides: as parameters of the vehicle, and the decision as its colour."""
+        """Show a host's belief and decision as parameters of the vehicle, and the decision as its colour."""
         follows = log_odds >= 0.0
         belief = f"{0.5 + 0.5 * math.tanh(0.5 * log_odds):.2f}"
         self.set_color(host, rgba(FOLLOWS) if follows else RGBA["host"])

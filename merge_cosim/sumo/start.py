@@ -130,7 +130,7 @@ def connection_kept() -> Iterator[None]:
 
 @contextmanager
 def running(session: Session, file: Path) -> Iterator[Session]:
-    """Use a session and close it; what SUMO refuses on the way is one line that begins with `file`.
+    """Use a session and close it; an error of SUMO meanwhile becomes one line that begins with `file`.
 
     Raises:
         UserError: SUMO has ended or refuses something.
@@ -145,13 +145,13 @@ def running(session: Session, file: Path) -> Iterator[Session]:
 
 
 def one_line(error: Exception) -> str:
-    """What SUMO says of an error, in one line."""
+    """SUMO's message of an error, in one line."""
     return " ".join(str(error).split()) or "no reason given"
 
 
 @contextmanager
 def _said() -> Iterator[Callable[[], str]]:
-    """Keep back what this process' libraries write to standard error; the function returns it."""
+    """Hold back what libraries write to standard error; the function that is given returns it."""
     sys.stderr.flush()
     with tempfile.TemporaryFile() as file:
 

@@ -68,7 +68,7 @@ def test_an_unknown_site_names_the_choices():
         ("[lanes]", "[lanes", "not valid TOML"),
         ('title = "A merge"', "", "title: missing; every site needs it"),
         ("shared", "shard", "lanes.shard: unknown key; did you mean 'shared'?"),
-        ("ramp = [2]", "ramp = [11]", "lanes: lane 11 is named twice; each lane plays one part"),
+        ("ramp = [2]", "ramp = [11]", "lanes: lane 11 is named twice; each lane has one part"),
         ("ramp = [2]", "ramp = []", "lanes.ramp: Tuple should have at least 1 item"),
         ('y = "s", ', "", "recording: columns.y is missing: name the file's column"),
         ("frame", "fame", "recording: columns.fame is no canonical column; these are vehicle_id, part, frame"),

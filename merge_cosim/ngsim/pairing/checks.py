@@ -21,7 +21,7 @@ HORIZON = 3.0
 
 @dataclass(frozen=True)
 class LoggedOutcome:
-    """What becomes of each encounter with the logged host; every array has shape (n,).
+    """The outcome of each encounter with the logged host; every array has shape (n,).
 
     Attributes:
         failed: The bodies overlap by more than the tolerance while scored.
@@ -35,7 +35,7 @@ class LoggedOutcome:
 
     @property
     def complete(self) -> BoolArray:
-        """The logs alone carry the scoring to its end."""
+        """The logs are long enough for all of the scoring."""
         return ~self.cut & ~self.extended
 
 
@@ -43,7 +43,7 @@ def replay_logged_host(encounters: Encounters, horizon: float = HORIZON) -> Logg
     """Score the logged host of each encounter: from the first cycle with both stations >= 0 for `horizon` seconds.
 
     A log that ends in the host lane goes on at its last speed, as in any replay (`MIN_SPEED` at least, so that a car
-    that stands in traffic still comes to be scored).
+    that stands in traffic is scored, too).
 
     Args:
         encounters: Encounters with a log.

@@ -52,7 +52,7 @@ def site_pairs(
     Args:
         data: Folder with trajectory files (or one such file).
         site: The site.
-        rules: The thresholds, those that are not set as the site has them; None for the site's.
+        rules: The thresholds; those that are not set are the site's. None for the site's.
         source: What the folder holds; None for the site's own recordings. The surrogate's files name it themselves.
         episodes_from: First episode to use beside the trajectories; None for the site's.
 
@@ -86,7 +86,7 @@ def site_encounters(
     source: Source | None = None,
     episodes_from: int | None = None,
 ) -> Encounters | None:
-    """Return the encounters of `site_pairs` alone; station 0 is each merging car's own lane change."""
+    """Return only the encounters of `site_pairs`; station 0 is each merging car's own lane change."""
     paired = site_pairs(data, site, rules, source=source, episodes_from=episodes_from)
     return None if paired is None else paired.encounters
 
@@ -96,7 +96,7 @@ def at_site_point(encounters: Encounters) -> Encounters:
 
     Station 0 at the logged lane change shows an estimator where the driver is going to merge; this variant does not.
     The cycle of the lane change and the label stay. An encounter that starts with its merging car past that point is
-    left out, since nothing is left to decide.
+    left out, since there is nothing to decide any more.
     """
     if encounters.log is None:
         raise ValueError("these encounters have no log")
@@ -137,7 +137,7 @@ def _most_cars(table: pa.Table) -> int:
 
 
 def _identity(data: Path) -> Iterator[str]:
-    """Path, size and time of every file, by which a cached result is known to be still good."""
+    """Path, size and time of every file, from which follows whether a cached result still holds."""
     for path in sorted(data.rglob("*")) if data.is_dir() else [data]:
         if path.is_file():
             state = path.stat()

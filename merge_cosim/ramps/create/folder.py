@@ -87,7 +87,7 @@ def write_ramp(
 
 
 def require_checked(folder: Path, named: Path) -> None:
-    """Refuse a ramp that `ramp check` finds a problem of; `named` is the folder that the error line speaks of.
+    """Refuse a ramp that `ramp check` finds a problem of; `named` is the folder in the error line.
 
     Raises:
         UserError: There is a problem; the line holds all of them.

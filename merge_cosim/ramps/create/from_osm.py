@@ -26,7 +26,7 @@ KEPT = ("highway.motorway", "highway.motorway_link", "highway.trunk", "highway.t
 GUESSED = "AddedOnRampEdge"
 """End of the ids of edges on which netconvert has guessed an acceleration lane."""
 NONE = re.compile(rb"""v=["']none["']""")
-"""A value of a tag that may say that there is no speed limit."""
+"""The value `none` of a tag, such as of a speed limit."""
 ADVISORY = "130"
 """Germany's advisory speed on motorways without a limit [km/h]."""
 WAY = re.compile(r"^-|[#-].*$")
@@ -102,7 +102,7 @@ def read_extract(
 
 
 def _convert(extract: Path, readable: Path, net_file: Path, left_hand: bool | None, *more: str) -> None:
-    """Make a net of an extract; error lines speak of `extract`, netconvert reads `readable`."""
+    """Make a net of an extract; netconvert reads `readable`; error lines name `extract`."""
     types = Path(sumo.SUMO_HOME) / "data" / "typemap" / "osmNetconvert.typ.xml"
     files = ("--osm-files", str(readable), "--type-files", str(types), "--output-file", str(net_file))
     try:
@@ -141,5 +141,5 @@ def _guessed_too_short(net: sumolib.net.Net, link: str | None, speed_limit: floa
     if not path.beside or GUESSED not in path.beside[0].getEdge().getID():
         return 0
     limit = speed_limit or float(path.main[path.before].getSpeed())
-    needed = limit**2 / (2.0 * COMFORTABLE_BRAKING) / 0.8  # the merging point is a fifth behind the gore
+    needed = limit**2 / (2.0 * COMFORTABLE_BRAKING) / 0.8  # the merging point is a fifth of the lane after the gore
     return math.ceil(needed / 10.0) * 10 if needed > sum(lane.getLength() for lane in path.beside) else 0
