@@ -20,6 +20,7 @@ from merge_cosim.core.registry import did_you_mean
 from merge_cosim.ngsim.data import find_data
 from merge_cosim.report.comparison import compare
 from merge_cosim.report.run_command import run_command
+from merge_cosim.results.notes import note_lines
 from merge_cosim.results.statistics.summary import CASE
 from merge_cosim.results.store import ENSEMBLE_CSV, MANIFEST, RIVALS_CSV, SUMMARY_JSON, ResultFolder
 
@@ -65,7 +66,7 @@ class Results:
     @cached_property
     def traces(self) -> pd.DataFrame:
         """Of the recorded cases, one row per cycle and method."""
-        return self._store.traces().to_pandas()
+        return self._store.traces.read().to_pandas()
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
@@ -100,7 +101,7 @@ class Results:
 
     def notes(self) -> list[str]:
         """What was noted in living traffic, a line for each kind of event."""
-        return self._store.note_lines()
+        return note_lines(self._store)
 
     def cases(self, where: str | None = None, fails: Sequence[str] = (), passes: Sequence[str] = ()) -> pd.DataFrame:
         """The rows for which a condition holds.

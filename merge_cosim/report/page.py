@@ -19,6 +19,7 @@ from merge_cosim.report.methods import in_order, looks
 from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER
 from merge_cosim.report.trace_data import fitting, recorded_cases
 from merge_cosim.report.traffic_table import traffic_table
+from merge_cosim.results.notes import note_lines
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.results.statistics.summary import GROUP, compare_all
 from merge_cosim.results.statistics.verdict import verdicts
@@ -85,8 +86,8 @@ def read_report(folder: Path, against: str | None = None) -> Report:
     manifest = store.read_json(MANIFEST)
     labels = [f"{name}={value}" for name, values in manifest["variations"] for value in values]
     summary = tables.summary_frame(_compared(store.read_json(SUMMARY_JSON), results, against), labels)
-    shown, left_out = fitting(store.recorded())
-    traces = store.traces(shown).to_pandas()
+    shown, left_out = fitting(store.traces.recorded())
+    traces = store.traces.read(shown).to_pandas()
     recorded = recorded_cases(traces, results)
     said = verdicts(summary, results)
     chapters = [
@@ -115,7 +116,7 @@ def write_report(folder: Path, against: str | None = None) -> Path:
     report = read_report(folder, against)
     write_tables(folder, report.tables)
     file = folder / REPORT
-    file.write_text(report_page(report, ResultFolder(folder).note_lines()), encoding="utf-8")
+    file.write_text(report_page(report, note_lines(ResultFolder(folder))), encoding="utf-8")
     return file
 
 

@@ -138,8 +138,8 @@ def rows_of_failures(folder: ResultFolder) -> pd.DataFrame:
     """All rows of the cases in which some method failed or got stuck; on the others no two methods differ."""
     found = []
     with readable(folder.path / RESULTS):
-        for scenario, variation in folder.groups():
-            for rows in folder.batches(scenario, variation, ROWS) if not variation else ():
+        for scenario, variation in folder.rows.groups():
+            for rows in folder.rows.batches(scenario, variation, ROWS) if not variation else ():
                 bad = rows.filter(pc.or_(rows["failed"], rows["stuck"]))
                 found.append(rows.filter(pc.is_in(rows["case"], pc.unique(bad["case"]))).to_pandas())
     return pd.concat(found, ignore_index=True) if found else pd.DataFrame(columns=ROWS)

@@ -75,14 +75,14 @@ def missing(tasks: Sequence[Task], folder: ResultFolder) -> Iterator[Task]:
     Raises:
         UserError: A case of the same name has another initial state.
     """
-    scenes = {tuple(scene[name] for name in NAMES) for scene in folder.scenes()}
+    scenes = {tuple(scene[name] for name in NAMES) for scene in folder.parts.scenes()}
     for task in tasks:
         pairs = task.cases.encounters
         if pairs is None:
             if tuple(task.names[name] for name in NAMES) not in scenes:
                 yield task
             continue
-        rows = folder.before(task.scenario.name, task.variation, ["case", "method", "model", *STATES]).to_pandas()
+        rows = folder.parts.before(task.scenario.name, task.variation, ["case", "method", "model", *STATES]).to_pandas()
         starts = rows.drop_duplicates("case").set_index("case")
         common = np.flatnonzero(np.isin(pairs.case, starts.index.to_numpy(dtype=str)))
         for column, name in STATES.items():

@@ -25,13 +25,13 @@ from merge_cosim.results.store import (
     CALIBRATION_CSV,
     ENSEMBLE_CSV,
     MANIFEST,
-    NO_RECORDS,
     RIVALS_CSV,
     STRATA_CSV,
     SUMMARY_CSV,
     SUMMARY_JSON,
     ResultFolder,
 )
+from merge_cosim.results.traces import NO_RECORDS
 from merge_cosim.scenarios.methods import ORACLE_BEST
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.adding import joined, missing
@@ -79,7 +79,7 @@ class _Earlier:
     def of(cls, folder: ResultFolder) -> _Earlier:
         rows = folder.read_json(SUMMARY_JSON)
         times = {row["method"]: (row["cycle_us"], row["cycle_us_single"]) for row in rows if row["cycle_us"]}
-        return cls(folder.recorded()[NO_RECORDS.columns], times)
+        return cls(folder.traces.recorded()[NO_RECORDS.columns], times)
 
 
 def sweep(
@@ -121,7 +121,7 @@ def sweep(
         try:
             tasks = list(missing(tasks, folder))
         except UserError:
-            folder.finish()  # as it was
+            folder.parts.finish()  # as it was
             raise
     elif resume and folder.holds(what):
         manifest: dict[str, Any] = folder.read_json(MANIFEST)
@@ -131,15 +131,15 @@ def sweep(
     planned = perf_counter()
     if progress and seconds(tasks, request.jobs) >= LONG_S:
         progress(0, sum(map(len, tasks)), forecast(tasks, request.jobs))
-    chunks, done = list(cut(tasks)), folder.done()
+    chunks, done = list(cut(tasks)), folder.parts.done()
     queue = ChunkQueue(chunk for chunk in chunks if chunk.name not in done)
     with closing(executor_for(request, len(queue))) as executor:
         tally = _run(executor, queue, chunks, folder, progress)
         ran = perf_counter()
         folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
-        folder.begin_traces(keep=add)
+        folder.traces.begin(keep=add)
         record(request, every, folder, earlier.recorded, executor, progress)
-    scenes = folder.scenes()
+    scenes = folder.parts.scenes()
     _sum_up(tasks, folder, scenes, tally, reference_of(what["methods"], what["against"]), earlier)
     effort, run_s = tally.effort, ran - planned
     manifest = {
@@ -160,7 +160,7 @@ def sweep(
                 **{plugin.name: str(plugin) for plugin in request.plugins},
             },
         },
-        "invariants": folder.invariants(),
+        "invariants": folder.parts.invariants(),
         "wall_s": round(perf_counter() - begin, 3),
         "plan_s": round(planned - begin, 3),
         "run_s": round(run_s, 3),
@@ -175,7 +175,7 @@ def sweep(
         "worst_station_difference_m": max(effort.worst_difference_m, before.get("worst_station_difference_m", 0.0)),
     }
     folder.write_json(MANIFEST, manifest)
-    folder.finish()
+    folder.parts.finish()
     if all(task.cases.scenes for task in every):
         refuse_empty(scenes, f"{out}: {', '.join(dict.fromkeys(task.scenario.name for task in every))}")
     return manifest
@@ -195,7 +195,7 @@ def _run(
     tally = _Tally()
     with closing(executor.run(queue)) as outcomes:
         for chunk, rows, effort in outcomes:
-            folder.add(chunk.name, rows)
+            folder.parts.add(chunk.name, rows)
             queue.finished(chunk, effort)
             tally.add(chunk.whole.method.name, effort)
             finished += len(chunk)
@@ -220,9 +220,9 @@ def _sum_up(
         if effort.encounter_cycles
     }
     parts: dict[str, list[pd.DataFrame]] = {name: [] for name in (SUMMARY_CSV, STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV)}
-    for group in folder.groups():
-        sums = Summary(folder.count(*group), against)
-        for batch in folder.batches(*group, COLUMNS):
+    for group in folder.rows.groups():
+        sums = Summary(folder.rows.count(*group), against)
+        for batch in folder.rows.batches(*group, COLUMNS):
             sums.add(batch.to_pandas())
         parts[SUMMARY_CSV].append(sums.table(cycle_us))
         parts[STRATA_CSV].append(sums.strata())
@@ -243,5 +243,5 @@ def _sum_up(
 
 def _labelled(folder: ResultFolder, scenario: str, variation: str) -> pd.DataFrame:
     """The rows of one scenario and variation whose cases have a label, with what beliefs are judged by."""
-    batches = folder.batches(scenario, variation, BELIEF_COLUMNS)
+    batches = folder.rows.batches(scenario, variation, BELIEF_COLUMNS)
     return pa.concat_tables(rows.filter(pc.not_equal(rows["label"], "")) for rows in batches).to_pandas()

@@ -16,8 +16,8 @@ from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.invariants import checked, joined
+from merge_cosim.results.parts import with_facts
 from merge_cosim.results.rows import result_rows
-from merge_cosim.results.store import with_facts
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.simulation.loop import Effort, Loop, Run

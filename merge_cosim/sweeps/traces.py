@@ -76,11 +76,11 @@ def record(
     with closing(executor), closing(executor.run(queue)) as outcomes:
         for chunk, records, effort in outcomes:
             queue.finished(chunk, effort)
-            folder.add_records(chunk.name, records)
+            folder.traces.add(chunk.name, records)
             done += len(chunk)
             if report:
                 report(done, total, f"recording {chunk.whole.scenario.name} {chunk.whole.method.name}")
-    folder.write_traces()
+    folder.traces.join()
 
 
 def _recorded(wanted: Traces, tasks: Sequence[Task], folder: ResultFolder, earlier: pd.DataFrame) -> Iterator[Task]:
@@ -93,7 +93,7 @@ def _recorded(wanted: Traces, tasks: Sequence[Task], folder: ResultFolder, earli
             continue
         if scenario not in chosen:
             before = earlier.loc[earlier["scenario"] == scenario, "case"].drop_duplicates().tolist()
-            rows = (batch.to_pandas() for batch in folder.batches(scenario, "", COLUMNS))
+            rows = (batch.to_pandas() for batch in folder.rows.batches(scenario, "", COLUMNS))
             new = [] if before and wanted is None else choose(rows, wanted)
             chosen[scenario] = list(dict.fromkeys([*before, *new]))
         places: dict[str, int] = {}

@@ -18,6 +18,7 @@ from merge_cosim.ngsim.pairing.episodes import episode_tracks
 from merge_cosim.ngsim.sites import read_site, site
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.ramps.view import netedit_view
+from merge_cosim.results.notes import note_lines
 from merge_cosim.results.store import ResultFolder
 from merge_cosim.scenarios.settings import parse_variation
 from merge_cosim.sumo.tiles import tile_net
@@ -181,7 +182,7 @@ def test_a_result_folder_with_one_other_byte(tmp_path: Path) -> None:
     done = merge_cosim("sweep", "s.toml", *words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     folder = ResultFolder(tmp_path / "out")
-    for name, read in (("results.parquet", folder.results), ("traces.parquet", folder.traces)):
+    for name, read in (("results.parquet", folder.results), ("traces.parquet", folder.traces.read)):
         file = tmp_path / "out" / name
         content = bytearray(file.read_bytes())
         page = pq.read_metadata(file).row_group(0).column(2)
@@ -192,7 +193,7 @@ def test_a_result_folder_with_one_other_byte(tmp_path: Path) -> None:
     for content in (b"scenario,n\nx,\xff", b"scenario,n\nx", b"outside_support,n\n1,y"):
         (tmp_path / "out/summary.csv").write_bytes(content)
         with pytest.raises(UserError, match=r"summary\.csv: damaged"):
-            folder.note_lines()
+            note_lines(folder)
 
 
 def test_a_condition_with_a_part_of_constants(tmp_path: Path) -> None:

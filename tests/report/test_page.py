@@ -80,7 +80,7 @@ def test_what_the_scripts_draw_is_what_was_run(swept, page):
         assert (sum(failed), sum(test["map"]["n"][method])) == (summary[method]["failures"], 27)
     [case] = data["cases"]  # 27 cases: one is recorded
     assert test["cases"] == [0]
-    traces = ResultFolder(swept).traces().to_pandas()
+    traces = ResultFolder(swept).traces.read().to_pandas()
     for run in case["runs"]:
         trace = traces[traces["method"] == run["method"]]
         for name, (column, digits) in QUANTITIES.items():

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 import merge_cosim as mc
-from merge_cosim.results import store
+from merge_cosim.results import merged_rows, parts
 from merge_cosim.results.store import SCENES_CSV, TRAFFIC_CSV
 from merge_cosim.sweeps.adding import joined
 
@@ -41,7 +41,8 @@ def same(one, other):
 
 
 def test_added_methods_scenarios_and_variations_give_the_rows_of_one_sweep(tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "STRETCH_ROWS", 20)
+    for module in (parts, merged_rows):
+        monkeypatch.setattr(module, "STRETCH_ROWS", 20)
     first, second = (tmp_path / f"{name}.toml" for name in ("first", "second"))
     first.write_text(SMALL)
     second.write_text(SMALL.replace("step = 4", "step = 8"))

@@ -19,7 +19,7 @@ from merge_cosim.ngsim.pairing.recordings import scenes_of
 from merge_cosim.ngsim.pairing.rules import PairRules
 from merge_cosim.ngsim.pairing.tracks import build_tracks
 from merge_cosim.ngsim.sites import site
-from merge_cosim.results.store import SCENE_FACTS
+from merge_cosim.results.parts import SCENE_FACTS
 from merge_cosim.scenarios.logged_scenes import load_scenes
 from merge_cosim.scenarios.methods import Method
 from merge_cosim.scenarios.scenario import load_scenario
