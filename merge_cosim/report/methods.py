@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import product
 
 from merge_cosim.core import colors
 from merge_cosim.scenarios.methods import REFERENCES, is_reference
@@ -106,7 +105,9 @@ def broken(name: str, most: int = 16) -> str:
 def _free(family: str | None, taken: Iterable[Look]) -> Look:
     used = {(look.color, look.mark) for look in taken} | {(look.color, look.mark) for look in KNOWN.values()}
     hues = [FAMILY_COLORS[family]] if family else [colors.OLIVE, *colors.DISTINCT]
-    pairs = [*((hue, mark) for mark, hue in product(MARKS, hues)), *product([colors.OLIVE], MARKS)]
+    many = len(hues)  # neighbours differ in both
+    places = range(many * len(MARKS))
+    pairs = [(hues[i % many], MARKS[(i % many + i // many) % len(MARKS)]) for i in places]
     color, mark = next((pair for pair in pairs if pair not in used), pairs[len(used) % len(pairs)])
     return Look(color, mark)
 

@@ -9,7 +9,7 @@ from matplotlib.transforms import Bbox
 from merge_cosim.report import canvas
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.figures import FORMATS
-from merge_cosim.report.methods import looks
+from merge_cosim.report.methods import broken, looks
 from merge_cosim.report.outcome_figures import lines_figure, tradeoff_figure
 from merge_cosim.results.store import ResultFolder
 
@@ -80,7 +80,7 @@ def _row(method, delay, bad, reference=False):
 def test_dots_stand_at_their_values_and_far_references_at_the_edge():
     rows = [_row("acc", 1.0, 3.0), _row("pgm", 2.0, 0.0), _row("always-brake", 43.0, 100.0, reference=True)]
     axes = tradeoff_figure(rows, looks(row["method"] for row in rows)).axes[0]
-    dots = {(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if line.get_marker() in "o>"}
+    dots = {(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if line.get_marker() in "oD>"}
     assert {(1.0, 3.0), (2.0, 0.0), (axes.get_xlim()[1], axes.get_ylim()[1])} == dots
     assert {text.get_text() for text in axes.texts} == {"acc", "pgm", "always-brake (43.0 s, 100 %)"}
 
@@ -103,9 +103,9 @@ def test_lines_have_signs_and_a_legend_makes_the_figure_higher():
 
 
 def test_long_names_are_parted_and_small_panels_follow_the_width():
-    assert canvas.broken("acc") == "acc"
+    assert broken("acc") == "acc"
     parts = ["my-own-", "estimator-with-", "a-long-name"]
-    assert canvas.broken("".join(parts)) == "\n".join(parts)
+    assert broken("".join(parts)) == "\n".join(parts)
     with canvas.made_for(canvas.Paper(width=3.3)):
         figure, axes = canvas.grid_of(7, 4, (1.8, 1.9))
     assert figure.get_figwidth() == pytest.approx(3.3)
