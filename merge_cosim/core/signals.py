@@ -69,16 +69,21 @@ def held_back(*numbers: signal.Signals) -> Iterator[None]:
 
 
 @contextmanager
-def interrupts_ignored() -> Iterator[None]:
-    """Processes that are started here ignore Ctrl-C: this process gets it afterwards, and ends them."""
+def interrupts_ignored(*blocked: signal.Signals) -> Iterator[None]:
+    """Processes that are started here ignore Ctrl-C: this process gets it afterwards, and ends them.
+
+    Args:
+        blocked: Signals that they get once they unblock them. A forked process has this one's handlers at first, and
+            loses what these raise while it starts.
+    """
     if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
         yield  # Windows has no masks, and no other thread is interrupted
         return
     from multiprocessing import resource_tracker
 
     resource_tracker.ensure_running()  # it would be started with the first process, and unblock the signal there
-    with held_back(signal.SIGINT):  # for threads without the mask
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    with held_back(signal.SIGINT, *blocked):  # for threads without the mask
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *blocked})
         try:
             yield
         finally:

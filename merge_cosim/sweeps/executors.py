@@ -149,7 +149,7 @@ class _Worker:
         self.process: Any = context.Process(  # type: ignore[attr-defined]
             target=_serve, args=(there, inherited, plugins), name="merge-cosim worker", daemon=True
         )
-        with interrupts_ignored(), main_hidden():
+        with interrupts_ignored(signal.SIGTERM), main_hidden():
             self.process.start()
         there.close()
 
@@ -175,6 +175,8 @@ def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path
     """What a worker process does: run what comes through the pipe, until that is empty or closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process gets it, too, and ends the workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if inherited is not None:
         inherited.close()  # else the worker would not notice the end of its parent process

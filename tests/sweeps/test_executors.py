@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 from contextlib import closing
@@ -120,6 +121,30 @@ class Stuck(mc.Estimator):
 def own_registry(monkeypatch):
     """What a test registers is gone after it: no other test of this process is to run a deadly estimator."""
     monkeypatch.setattr(estimators, "_classes", {name: estimators[name] for name in estimators.names()})
+
+
+ENDED_AT_ONCE = """
+import os, signal
+from merge_cosim.cli.interrupts import ended_by_signal
+from merge_cosim.core.errors import UserError
+from merge_cosim.sweeps.chunks import ChunkQueue, cut
+from merge_cosim.sweeps.executors import Processes
+from merge_cosim.sweeps.plan import SweepRequest, plan
+
+ended_by_signal()
+os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGTERM))
+request = SweepRequest(["designed-random"], ["acc"], settings={"encounters.count": 2}, world="closed-form")
+try:
+    list(Processes(2, start="fork").run(ChunkQueue(cut(plan(request), 2))))
+except UserError as error:
+    print(error)
+"""
+
+
+def test_a_worker_that_is_ended_while_it_starts_ends_without_a_traceback():
+    done = subprocess.run([sys.executable, "-c", ENDED_AT_ONCE], capture_output=True, text=True, check=False)
+    assert "3 worker processes in a row died while running these cases, the last one by signal 15" in done.stdout
+    assert done.stderr == ""
 
 
 def test_a_piece_that_kills_every_worker_ends_the_sweep_with_a_clear_line(tmp_path, own_registry):
