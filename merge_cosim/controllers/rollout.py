@@ -58,9 +58,12 @@ class Rollout(ReactingDriver, Acc):
     unless another is cheaper by `commitment`. The command changes by at most `max_jerk * dt` a cycle, but for the two
     hardest policies and for escapes.
 
-    Where the chosen policy's overlap has the probability `tolerated_risk` or more, and an escape exists (full braking
-    or full acceleration that avoids an overlap whatever a driver within stated bounds does), the command is the nearest
-    one that leaves an escape for the next cycle. With `tolerated_risk=0` an escape that exists is never given up.
+    An escape is full braking or full acceleration that avoids an overlap whatever a driver within bounds does. Where
+    the chosen policy's overlap has the probability `tolerated_risk` or more, the command is the nearest one that leaves
+    an escape for the next cycle. Where none exists within the bounds `-escape_braking` to `escape_acceleration`, they
+    are narrowed in `escape_grades` steps around what the driver is expected to do now, until one does; where none does
+    even so, the policy is chosen with the cost `last_overlap` of an overlap. With `tolerated_risk=0` an escape from
+    the full bounds is never given up.
 
     Once the merging car is in the lane the law of acc drives. Beliefs, margins and reaction are those of the estimator
     `interactive`. Of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left
@@ -87,6 +90,8 @@ class Rollout(ReactingDriver, Acc):
         escape_acceleration: A driver's hardest acceleration as the escape allows for [m/s^2].
         follower_braking: Braking that a driver behind the host is sure to have [m/s^2].
         follower_reaction: Time after which it brakes [s].
+        escape_grades: Steps in which the driver's bounds are narrowed to 0, until there is an escape.
+        last_overlap: Cost of an overlap where there is no escape [s].
         least_belief: Types with less belief are not rolled out.
         ignore_share: Belief in `ignore` where the estimator has log-odds only.
         standing: Speed below which a merging car may be waiting for the host [m/s].
@@ -99,21 +104,23 @@ class Rollout(ReactingDriver, Acc):
     step: PositiveFloat = 0.25
     goal: PositiveFloat = 50.0
     scored: PositiveFloat = 3.0
-    overlap: NonNegativeFloat = 10.0
+    overlap: NonNegativeFloat = 8.0
     spread: PositiveFloat = 0.5
     spread_rate: NonNegativeFloat = 0.5
     progress: NonNegativeFloat = 1.0
     effort: NonNegativeFloat = 0.1
     sudden: NonNegativeFloat = 0.1
     reacts: bool = True
-    commitment: NonNegativeFloat = 0.2
-    max_jerk: PositiveFloat = 3.0
+    commitment: NonNegativeFloat = 0.5
+    max_jerk: PositiveFloat = 4.0
     escape: bool = True
-    tolerated_risk: Share = 0.02
+    tolerated_risk: Share = 0.01
     escape_braking: NonNegativeFloat = 4.0
     escape_acceleration: Acceleration = 3.0
     follower_braking: PositiveFloat = 3.0
     follower_reaction: NonNegativeFloat = 0.3
+    escape_grades: Count = 8
+    last_overlap: NonNegativeFloat = 1000.0
     least_belief: Share = 0.001
     ignore_share: Annotated[float, Field(ge=0, lt=1)] = 0.2
     standing: NonNegativeFloat = 1.0
@@ -179,20 +186,22 @@ class Rollout(ReactingDriver, Acc):
         self._delays = np.zeros(count)
         self._last = np.full(count, np.nan)
         self.last_policy = np.full(count, -1)
-        self.last_costs = np.zeros((count, len(POLICIES), len(DRIVER_TYPES)))
         self.last_belief = np.zeros((count, len(DRIVER_TYPES)))
         self.risk = np.zeros(count)
         self._plans = np.zeros(count, dtype=bool)
         self.escape_status = np.zeros(count, dtype=np.int64)
+        self._centre, self._in_lane = np.zeros((2, count))
+        self._shares = np.arange(self.escape_grades, 0, -1) / self.escape_grades
 
     def reset(self, rows: IntArray) -> None:
         """Forget the last commands and policies at `rows`."""
         self._last[rows] = np.nan
         self.last_policy[rows] = -1
+        self._in_lane[rows] = 0.0
 
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """The cheapest policy's acceleration, with commitment, bounded jerk and an escape."""
-        from merge_cosim.controllers.compiled.escapes import constrain
+        from merge_cosim.controllers.compiled.escapes import NONE, constrain
         from merge_cosim.controllers.compiled.rollouts import choose
 
         wanted = super().command(seen, log_odds, target)
@@ -202,9 +211,8 @@ class Rollout(ReactingDriver, Acc):
         traits, delays = self._traits, self._delays
         if self._filter is not None:
             traits, delays = self._filter.traits, self._filter.unreacted * self._filter.reaction_time
-        choose(
-            state,
-            plans,
+        self._seen = state, self.last_belief, traits, delays, self._last
+        rest = (
             self.last_belief,
             traits,
             delays,
@@ -213,32 +221,57 @@ class Rollout(ReactingDriver, Acc):
             self._last,
             self.least_belief,
             self.commitment,
-            self._host_law,
-            self._driver_law,
-            self.last_costs,
-            self.last_policy,
-            self.risk,
-            wanted,
         )
-        change = self.max_jerk * self.setting.dt
-        smooth = np.minimum(np.maximum(wanted, self._last - change), self._last + change)
-        free_to_change = np.isnan(self._last) | ~plans | (self._kinds[self.last_policy] == _SUDDEN)
-        command = np.where(free_to_change, wanted, smooth)
+        filled = self._driver_law, self.last_policy, self.risk, self._centre, wanted
+        choose(state, plans, *rest, self._host_law, *filled)
+        command = self._smooth(wanted, plans)
+        self._guard = self._shares, self._centre, self._in_lane
+        self._in_lane = np.where(plans, 0.0, self._in_lane + self.setting.dt)
         if self.escape:
-            guarded = np.where(plans, self.risk >= self.tolerated_risk, seen.merging_ahead)
-            constrain(state, guarded, _LEVELS, self._bounds, command, self.escape_status)
+            guarded = ~plans | (self.risk >= self.tolerated_risk)
+            constrain(state, guarded, *self._guard, _LEVELS, self._bounds, command, self.escape_status)
+            lost = plans & (self.escape_status == NONE)
+            if np.count_nonzero(lost):
+                choose(state, lost, *rest, self._host_law._replace(overlap=self.last_overlap), *filled)
+                command = np.where(lost, wanted, command)
         self._last = command.copy()
         return command
 
     @property
+    def last_costs(self) -> FloatArray:
+        """Cost of every policy against every type in the last cycle, shape (n, policies, types)."""
+        from merge_cosim.controllers.compiled.rollouts import cost_table
+
+        state, belief, traits, delays, last = self._seen
+        costs = np.empty((len(belief), len(POLICIES), len(DRIVER_TYPES)))
+        rest = self.least_belief, self._host_law, self._driver_law, costs
+        cost_table(state, belief, traits, delays, self._kinds, self._held, last, *rest)
+        return costs
+
+    def _smooth(self, wanted: FloatArray, plans: BoolArray) -> FloatArray:
+        change = self.max_jerk * self.setting.dt
+        smooth = np.minimum(np.maximum(wanted, self._last - change), self._last + change)
+        free_to_change = np.isnan(self._last) | ~plans | (self._kinds[self.last_policy] == _SUDDEN)
+        return np.where(free_to_change, wanted, smooth)
+
+    @property
+    def escape_share(self) -> FloatArray:
+        """The largest share of the driver's bounds within which there was an escape in the last cycle, shape (n,)."""
+        from merge_cosim.controllers.compiled.escapes import widest
+
+        found = np.empty(len(self._centre))
+        widest(self._seen[0], *self._guard, self._bounds, found)
+        return found
+
+    @property
     def channels(self) -> tuple[str, ...]:
-        """The number of the chosen policy, and the expected cost of each."""
-        return ("policy", *(f"cost_s {name}" for name in POLICIES))
+        """The number of the chosen policy, `escape_share`, and the expected cost of each policy."""
+        return ("policy", "escape_share", *(f"cost_s {name}" for name in POLICIES))
 
     def channel_values(self) -> FloatArray:
-        """The number of the chosen policy in `POLICIES`, and the expected cost of each [s]."""
+        """The number of the chosen policy in `POLICIES`, `escape_share`, and the expected cost of each policy [s]."""
         costs = (self.last_costs * self.last_belief[:, None]).sum(axis=2).T
-        return np.where(self._plans, np.vstack([self.last_policy, costs]), np.nan)
+        return np.where(self._plans, np.vstack([self.last_policy, self.escape_share, costs]), np.nan)
 
     def _belief(self, seen: Observation, log_odds: FloatArray) -> FloatArray:
         """Belief over `DRIVER_TYPES`, shape (n, types)."""

@@ -8,7 +8,7 @@ from numba import njit
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.estimators.compiled.drivers import TOL
 
-SHORT = 0.1
+SHORT = 0.001
 """Way before the merging point [m] within which the host counts as having reached it."""
 UNSEEN, NONE, LEFT, FORCED = -1, 0, 1, 2
 """Not looked at; no escape exists; the wanted acceleration leaves one; the acceleration was changed to leave one."""
@@ -32,42 +32,46 @@ class Bounds(NamedTuple):
 def escapes(
     first: float,
     then: float,
-    host_station: float,
-    host_speed: float,
-    host_length: float,
-    station: float,
-    speed: float,
-    length: float,
+    state: FloatArray,
+    low: float,
+    high: float,
+    since: float,
     bounds: Bounds,
 ) -> bool:
     """Whether acceleration `first` for one cycle and `then` ever after avoids an overlap for certain.
 
-    Until the host's front reaches the merging point the driver may do anything within its bounds, so its stations lie
-    between that of full braking and that of full acceleration. If all of them are then upstream of the merging point,
-    the driver comes behind: it may accelerate until it is in the lane, and a reaction time later brakes at least with
-    `follower_braking`. If all are a length ahead, it may brake as hard as it can.
+    Until the host's front reaches the merging point the driver may do anything from `low` to `high`, so its stations
+    lie between those of these two. If all of them are then upstream of the merging point, the driver comes behind: it
+    may accelerate until it is in the lane, and a reaction time later brakes at least with `follower_braking`. If all
+    are a length ahead, it may go on with `low`. A driver already in the lane has been there for the time `since`.
     """
+    host_station, host_speed, station, speed, host_length, length = state
     dt = bounds.dt
     top = max(bounds.speed_limit, speed)
     slow_station, slow_speed = station, speed
     fast_station, fast_speed = station, speed
     acceleration = first
     order = 0  # 1: the driver is behind, 2: ahead
-    since = 0.0
+    if host_station >= -SHORT:
+        if station < host_station - TOL:
+            order = 1
+        elif station >= -TOL:
+            order = 2
     for _ in range(bounds.cycles):
         host_speed = min(max(host_speed + acceleration * dt, 0.0), max(bounds.speed_limit, host_speed))
         host_station += host_speed * dt
         acceleration = then
-        slow_speed = max(slow_speed - bounds.driver_braking * dt, 0.0)
+        slow_speed = min(max(slow_speed + low * dt, 0.0), top)
         slow_station += slow_speed * dt
-        if order == 1 and since >= bounds.follower_reaction:
+        in_lane = fast_station >= -TOL
+        if order == 1 and since >= bounds.follower_reaction - TOL:
             fast_speed = max(fast_speed - bounds.follower_braking * dt, 0.0)
         else:
-            fast_speed = min(fast_speed + bounds.driver_acceleration * dt, top)
+            fast_speed = min(max(fast_speed + high * dt, 0.0), top)
         fast_station += fast_speed * dt
+        if host_station < -TOL and host_speed <= 0.0:
+            return True
         if host_station < -SHORT:
-            if host_speed <= 0.0:
-                return True
             continue
         if order == 0:
             if fast_station < -TOL:
@@ -77,15 +81,15 @@ def escapes(
             else:
                 return False
         if order == 1:
-            since += dt if fast_station >= -TOL else 0.0
+            since += dt if in_lane else 0.0
             if fast_station >= -TOL and host_station - host_length < fast_station - TOL:
                 return False
-            if since >= bounds.follower_reaction and fast_speed <= host_speed and then >= 0.0:
+            if since >= bounds.follower_reaction - TOL and fast_speed <= host_speed and then >= 0.0:
                 return True
         else:
             if slow_station - length < host_station - TOL:
                 return False
-            if then <= 0.0 and host_speed <= slow_speed and host_speed <= 0.0:
+            if host_speed <= slow_speed and (host_speed <= 0.0 or then <= low):
                 return True
         if host_speed <= 0.0 and fast_speed <= 0.0 and slow_speed <= 0.0:
             return True
@@ -93,32 +97,51 @@ def escapes(
 
 
 @njit(cache=True)
+def narrowed(share: float, centre: float, bounds: Bounds) -> tuple[float, float]:
+    """A share of the range of a driver's accelerations [m/s^2], around what it is expected to do."""
+    low = centre - share * (centre + bounds.driver_braking)
+    return low, centre + share * (bounds.driver_acceleration - centre)
+
+
+@njit(cache=True)
 def kept(
     first: float,
-    host_station: float,
-    host_speed: float,
-    host_length: float,
-    station: float,
-    speed: float,
-    length: float,
+    state: FloatArray,
+    low: float,
+    high: float,
+    since: float,
     bounds: Bounds,
 ) -> bool:
     """Whether an escape is left after one cycle of acceleration `first`."""
     for then in (bounds.min_acceleration, bounds.max_acceleration):
-        if escapes(first, then, host_station, host_speed, host_length, station, speed, length, bounds):
+        if escapes(first, then, state, low, high, since, bounds):
             return True
     return False
 
 
 @njit(cache=True)
 def constrain(
-    state: FloatArray, guarded: BoolArray, levels: int, bounds: Bounds, wanted: FloatArray, status: IntArray
+    state: FloatArray,
+    guarded: BoolArray,
+    shares: FloatArray,
+    centre: FloatArray,
+    since: FloatArray,
+    levels: int,
+    bounds: Bounds,
+    wanted: FloatArray,
+    status: IntArray,
 ) -> None:
     """Change accelerations to the nearest ones that leave an escape, where there is an escape.
+
+    The bounds on the driver are narrowed to `shares` of their widths around `centre`, one after the other, until there
+    is an escape within them.
 
     Args:
         state: The rows of an `Observation`, shape (6, n).
         guarded: Encounters that are looked at, shape (n,).
+        shares: Shares of the driver's bounds, falling, shape (grades,).
+        centre: What the driver is expected to do [m/s^2], shape (n,).
+        since: Time for which the driver has been in the lane [s], shape (n,).
         levels: Number of steps between the wanted acceleration and the escape's that are tried.
         bounds: What the host can do and the merging driver may do.
         wanted: Accelerations [m/s^2], to be changed, shape (n,).
@@ -128,20 +151,41 @@ def constrain(
         status[row] = UNSEEN
         if not guarded[row]:
             continue
-        h, v, s, u, length_h, length_m = state[:, row]
         first = wanted[row]
-        status[row] = LEFT
-        if kept(first, h, v, length_h, s, u, length_m, bounds):
-            continue
-        status[row] = NONE
-        nearest = np.inf
-        for bound in (bounds.min_acceleration, bounds.max_acceleration):
-            if not escapes(bound, bound, h, v, length_h, s, u, length_m, bounds):
-                continue
-            status[row] = FORCED
-            for level in range(1, levels + 1):
-                tried = first + (bound - first) * level / levels
-                if level == levels or escapes(tried, bound, h, v, length_h, s, u, length_m, bounds):
-                    if abs(tried - first) < nearest:
-                        nearest, wanted[row] = abs(tried - first), tried
-                    break
+        for share in shares:
+            low, high = narrowed(share, centre[row], bounds)
+            status[row] = LEFT
+            if kept(first, state[:, row], low, high, since[row], bounds):
+                break
+            status[row] = NONE
+            nearest = np.inf
+            for bound in (bounds.min_acceleration, bounds.max_acceleration):
+                if not escapes(bound, bound, state[:, row], low, high, since[row], bounds):
+                    continue
+                status[row] = FORCED
+                for level in range(1, levels + 1):
+                    tried = first + (bound - first) * level / levels
+                    if level == levels or escapes(tried, bound, state[:, row], low, high, since[row], bounds):
+                        if abs(tried - first) < nearest:
+                            nearest, wanted[row] = abs(tried - first), tried
+                        break
+            if status[row] == FORCED:
+                break
+
+
+@njit(cache=True)
+def widest(
+    state: FloatArray, shares: FloatArray, centre: FloatArray, since: FloatArray, bounds: Bounds, found: FloatArray
+) -> None:
+    """Fill `found` with the largest share of the driver's bounds within which there is an escape, 0 without one."""
+    for row in range(state.shape[1]):
+        found[row] = 0.0
+        for share in shares:
+            low, high = narrowed(share, centre[row], bounds)
+            if escapes(
+                bounds.min_acceleration, bounds.min_acceleration, state[:, row], low, high, since[row], bounds
+            ) or escapes(
+                bounds.max_acceleration, bounds.max_acceleration, state[:, row], low, high, since[row], bounds
+            ):
+                found[row] = share
+                break

@@ -3,6 +3,7 @@
 from math import exp, sqrt
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
@@ -76,6 +77,14 @@ def host_acceleration(
 
 
 @njit(cache=True)
+def soonest(way: float, speed: float, limit: float, host: HostLaw) -> float:
+    """A time [s] that is surely not above what a rollout takes for the rest of the way to the goal."""
+    if way > 4.0 * limit / host.k_free:  # there the speed after the rollout may be taken to be above the limit
+        return 0.0
+    return way / (1.1 * max(limit, speed))
+
+
+@njit(cache=True)
 def rollout(
     policy: int,
     held: float,
@@ -89,21 +98,31 @@ def rollout(
     speed: float,
     length: float,
     last: float,
+    enough: float,
     host: HostLaw,
     law: DriverLaw,
 ) -> tuple[float, float]:
-    """Cost of one policy against one type of driver, and the probability of an overlap."""
+    """Cost of one policy against one type of driver, and the probability of an overlap.
+
+    Where the cost is sure to be above `enough`, the rollout stops and gives some cost above it.
+    """
     limit = law.speed_limit
     goal = max(host_station, 0.0) + host.goal
+    extra = host.sudden if policy == SUDDEN else 0.0
     surest = 1e9
     effort = 0.0
     acceleration = last
     unmoved = reacting(kind, trait, host_station, host_speed, host_length, station, speed, law)
     reached = -1.0
+    sure = 0.0
     both = -1
     time = 0.0
     change = host.change * host.step
     for _ in range(host.steps):
+        if reached < 0.0:
+            sure = time + soonest(goal - host_station, host_speed, limit, host)
+        if host.progress * sure + host.effort * effort + extra > enough:
+            return np.inf, 0.0
         wanted = host_acceleration(policy, held, host_station, host_speed, station, speed, length, host, limit)
         if policy != SUDDEN and acceleration == acceleration:  # not NaN: there is a command before
             wanted = min(max(wanted, acceleration - change), acceleration + change)
@@ -119,7 +138,7 @@ def rollout(
         if before > host_speed:
             effort += (before - host_speed) * (before - host_speed) / host.step
         if reached < 0.0 and host_station + host_speed * host.step >= goal:
-            reached = time + (goal - host_station) / host_speed
+            reached = sure = time + (goal - host_station) / host_speed
         host_station += host_speed * host.step
         station += speed * host.step
         time += host.step
@@ -145,11 +164,90 @@ def rollout(
     if reached < 0.0:
         pull = min(max(0.5 * host.k_free * (limit - host_speed), 0.05), host.max_acceleration)
         reached = time + (sqrt(host_speed * host_speed + 2.0 * pull * (goal - host_station)) - host_speed) / pull
-    cost = host.progress * reached + host.effort * effort
-    if policy == SUDDEN:
-        cost += host.sudden
+    cost = host.progress * reached + host.effort * effort + extra
     probability = 1.0 / (1.0 + exp(min(max(LOGISTIC * surest, -50.0), 50.0)))
     return cost + host.overlap * probability, probability
+
+
+@njit(cache=True)
+def expected_cost(
+    row: int,
+    policy: int,
+    held: float,
+    state: FloatArray,
+    belief: FloatArray,
+    traits: FloatArray,
+    delay: float,
+    last: float,
+    least: float,
+    enough: float,
+    host: HostLaw,
+    law: DriverLaw,
+) -> tuple[float, float]:
+    """Cost of a policy expected over the types of drivers, and probability of an overlap; see `rollout`."""
+    h, v, s, u, length_h, length_m = state[:, row]
+    expected, danger, left, likeliest = 0.0, 0.0, 0.0, 0
+    for kind in range(belief.shape[1]):
+        if belief[row, kind] >= least:
+            left += belief[row, kind]
+        if belief[row, kind] > belief[row, likeliest]:
+            likeliest = kind
+    soon = host.progress * soonest(max(h, 0.0) + host.goal - h, v, law.speed_limit, host)
+    for number in range(-1, belief.shape[1]):  # the likeliest type first, which tells soonest that the cost is too high
+        kind = likeliest if number < 0 else number
+        share = belief[row, kind]
+        if share < least or number == likeliest:
+            continue
+        left -= share
+        most = (enough - expected - soon * left) / max(share, 1e-300)
+        cost, overlaps = rollout(
+            policy, held, kind, traits[row, kind], delay, h, v, length_h, s, u, length_m, last, most, host, law
+        )
+        expected += share * cost
+        danger += share * overlaps
+        if expected + soon * left > enough:
+            return np.inf, 0.0
+    return expected, danger
+
+
+@njit(cache=True)
+def cost_table(
+    state: FloatArray,
+    belief: FloatArray,
+    traits: FloatArray,
+    delays: FloatArray,
+    kinds: IntArray,
+    held: FloatArray,
+    last: FloatArray,
+    least: float,
+    host: HostLaw,
+    law: DriverLaw,
+    costs: FloatArray,
+) -> None:
+    """Fill `costs`, shape (n, policies, types), with the cost of every policy against every type; see `choose`."""
+    for row in range(state.shape[1]):
+        h, v, s, u, length_h, length_m = state[:, row]
+        for policy in range(kinds.shape[0]):
+            for kind in range(belief.shape[1]):
+                costs[row, policy, kind] = 0.0
+                if belief[row, kind] >= least:
+                    costs[row, policy, kind], _ = rollout(
+                        kinds[policy],
+                        held[policy],
+                        kind,
+                        traits[row, kind],
+                        delays[row],
+                        h,
+                        v,
+                        length_h,
+                        s,
+                        u,
+                        length_m,
+                        last[row],
+                        np.inf,
+                        host,
+                        law,
+                    )
 
 
 @njit(cache=True)
@@ -166,12 +264,14 @@ def choose(
     commitment: float,
     host: HostLaw,
     law: DriverLaw,
-    costs: FloatArray,
     chosen: IntArray,
     risk: FloatArray,
+    centre: FloatArray,
     wanted: FloatArray,
 ) -> None:
     """Choose a policy for each encounter that `plans`, and what it wants now.
+
+    Policies are rolled out only until it is sure that they are not chosen.
 
     Args:
         state: The rows of an `Observation`, shape (6, n).
@@ -186,45 +286,54 @@ def choose(
         commitment: How much cheaper a policy must be to replace the chosen one.
         host: Constants of the host and of the costs.
         law: Constants of the drivers.
-        costs: To be filled, shape (n, policies, types).
         chosen: Policy of the cycle before, -1 without one; to be changed, shape (n,).
         risk: Probability of an overlap under the chosen policy; to be filled, shape (n,).
+        centre: Acceleration expected of the driver [m/s^2]; to be filled, shape (n,).
         wanted: Acceleration that the chosen policy wants [m/s^2]; to be filled, shape (n,).
     """
     for row in range(state.shape[1]):
+        h, v, s, u, length_h, length_m = state[:, row]
+        centre[row] = 0.0
+        for kind in range(belief.shape[1]):
+            if belief[row, kind] >= least:
+                centre[row] += belief[row, kind] * reacting(kind, traits[row, kind], h, v, length_h, s, u, law)
         if not plans[row]:
             continue
-        h, v, s, u, length_h, length_m = state[:, row]
-        best, best_cost, kept_cost, best_risk = -1, 0.0, 0.0, 0.0
+        before, enough = chosen[row], np.inf
+        if before >= 0:
+            cost, risk[row] = expected_cost(
+                row,
+                kinds[before],
+                held[before],
+                state,
+                belief,
+                traits,
+                delays[row],
+                last[row],
+                least,
+                np.inf,
+                host,
+                law,
+            )
+            enough = cost - commitment
         for policy in range(kinds.shape[0]):
-            expected, danger = 0.0, 0.0
-            for kind in range(belief.shape[1]):
-                costs[row, policy, kind] = 0.0
-                if belief[row, kind] >= least:
-                    cost, overlaps = rollout(
-                        kinds[policy],
-                        held[policy],
-                        kind,
-                        traits[row, kind],
-                        delays[row],
-                        h,
-                        v,
-                        length_h,
-                        s,
-                        u,
-                        length_m,
-                        last[row],
-                        host,
-                        law,
-                    )
-                    costs[row, policy, kind] = cost
-                    expected += belief[row, kind] * cost
-                    danger += belief[row, kind] * overlaps
-            if best < 0 or expected < best_cost:
-                best, best_cost, best_risk = policy, expected, danger
-            if policy == chosen[row]:
-                kept_cost, risk[row] = expected, danger
-        if chosen[row] < 0 or best_cost < kept_cost - commitment:
-            chosen[row], risk[row] = best, best_risk
+            if policy == before:
+                continue
+            cost, danger = expected_cost(
+                row,
+                kinds[policy],
+                held[policy],
+                state,
+                belief,
+                traits,
+                delays[row],
+                last[row],
+                least,
+                enough,
+                host,
+                law,
+            )
+            if cost < enough:
+                enough, chosen[row], risk[row] = cost, policy, danger
         policy = chosen[row]
         wanted[row] = host_acceleration(kinds[policy], held[policy], h, v, s, u, length_m, host, law.speed_limit)
