@@ -2,7 +2,7 @@
 
 The blocks `<!-- proof: NAME -->` ... `<!-- end -->` of docs/methods/interactive.md are tables of sweeps, each with the
 command that gives the same figures. `<!-- choice: CASE -->` shows why policies were chosen in a case of Designed Test
-III.
+III, `<!-- escapes: all -->` how often there is an escape, `<!-- losses: all -->` when the failed cases lost theirs.
 Without --data, tables of logged cars stay as they are; with --again only the rows of these methods are made anew.
 """
 
@@ -33,6 +33,10 @@ SHORT = {
     "shifted": {"encounters.count": 20},
 }
 OTHERS = ["acc", "slot", "slot-time", "pgm", "ipcb"]
+LOSSES: list[tuple[str, dict[str, Any]]] = [
+    *(("designed-3", dict.fromkeys(SEED, seed)) for seed in range(10)),
+    *((scenario, {}) for scenario in ("shifted-idm", "shifted-late", "shifted-never-look", "us101-replay")),
+]
 PAGE = "methods/interactive.md"
 
 
@@ -68,7 +72,10 @@ ABLATIONS: list[dict[str, Any]] = [
     {"rollout.tolerated_risk": 0.0},
     {"rollout.overlap": 1000.0},
     {"rollout.spread_rate": 0.0},
+    {"rollout.escape_grades": 1},
+    {"rollout.last_overlap": 8.0},
 ]
+FRONT: list[dict[str, Any]] = [{"rollout.tolerated_risk": risk} for risk in (0.0, 0.001, 0.01, 0.02, 0.1, 1.0)]
 STUDIES = {
     "designed": Study(["designed-2"], RIVALS),
     "narrow": Study(["designed-2"], RIVALS, [NARROW]),
@@ -80,7 +87,9 @@ STUDIES = {
     "replay": Study(["us101-replay"], [*RIVALS, "human"], logged=True),
     "planners": Study(["designed-3"], ["interactive", *PLANNERS, "oracle-label+rollout"]),
     "ablations": Study(["designed-3"], ["interactive"], ABLATIONS),
+    "front": Study(["designed-3"], ["interactive"], FRONT),
 }
+WHOLE = [*STUDIES, "choice", "escapes", "losses"]
 
 
 def shown(settings: dict[str, Any]) -> str:
@@ -176,19 +185,70 @@ def choice(case: str) -> str:
     return text
 
 
+def traced(scenario: str, kept: str, settings: dict[str, Any], data: Path | None) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Rows and traces of `interactive`; a trace's first cycle tells whether an escape existed at the start."""
+    found = mc.sweep(
+        scenario, "interactive", settings=settings, traces=kept, data=data, world="closed-form", progress=False
+    )
+    return found.rows, found.traces
+
+
+def escapes(short: bool) -> str:
+    """How often there is an escape in Designed Test III, and who fails with and without one at the start."""
+    rows = []
+    for settings in FRONT[0], {}:
+        given = settings | (SHORT["designed-3"] if short else {})
+        cases, cycles = traced("designed-3", "all", given, None)
+        share = cycles["escape_share"].dropna()
+        starts = cycles.groupby("case")["escape_share"].first() == 1.0
+        failed = cases.set_index("case")["failed"].astype(bool).reindex(starts.index)
+        rows.append(
+            [
+                shown(settings) or "as frozen",
+                *(f"{100 * part.mean():.1f}" for part in (share == 1.0, (share < 1.0) & (share > 0.0), share == 0.0)),
+                *(f"{failed[part].sum()} of {part.sum()}" for part in (starts, ~starts)),
+            ]
+        )
+    head = ["settings", "cycles with an escape [%]", "within narrowed bounds [%]", "without [%]"]
+    return table([*head, "failed of those with an escape at the start", "of those without"], rows)
+
+
+def losses(short: bool, data: Path | None) -> str | None:
+    """When each failed case lost its escape."""
+    if data is None:
+        return None
+    rows = []
+    for scenario, settings in LOSSES:
+        given = settings | ({"encounters.count": 20} if short and scenario != "us101-replay" else {})
+        cases, cycles = traced(scenario, "failed", given, data if scenario == "us101-replay" else None)
+        failed = cases[cases["failed"].astype(bool)]
+        for case, one in cycles[cycles["case"].isin(failed["case"])].groupby("case", sort=False):
+            share, time = one["escape_share"].to_numpy(), one["time_s"].to_numpy()
+            last = (f"{time[there].max():.1f}" if there.any() else "-" for there in (share == 1.0, share > 0.0))
+            label = str(failed.set_index("case")["label"][case]) or "-"
+            rows.append([scenario, str(case), label, f"{share[0]:.2f}", *last, f"{time.max():.1f}"])
+    head = ["scenario", "case", "label", "share of the bounds at the start", "last escape [s]"]
+    return table([*head, "last within narrowed bounds [s]", "failed [s]"], rows, left=3)
+
+
 def main(argv: Sequence[str] | None = None) -> None:
     """Fill the page's blocks."""
     parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, help="folder with real NGSIM files")
-    parser.add_argument("--only", nargs="*", choices=[*STUDIES, "choice"], help="blocks to fill; all, if not given")
+    parser.add_argument("--only", nargs="*", choices=WHOLE, help="blocks to fill; all, if not given")
     parser.add_argument("--again", nargs="*", default=[], help="methods whose rows are made anew; all, if not given")
     given = parser.parse_args(argv)
-    wanted = given.only or [*STUDIES, "choice"]
+    wanted = given.only or WHOLE
 
     def proof_or_stay(name: str) -> str | None:
         return proof(name, given.short, given.data, given.again) if name in wanted else None
 
-    kinds = {"proof": proof_or_stay, "choice": lambda case: choice(case) if "choice" in wanted else None}
+    kinds = {
+        "proof": proof_or_stay,
+        "choice": lambda case: choice(case) if "choice" in wanted else None,
+        "escapes": lambda _: escapes(given.short) if "escapes" in wanted else None,
+        "losses": lambda _: losses(given.short, given.data) if "losses" in wanted else None,
+    }
     fill_page(PAGE, given.docs, kinds)
 
 
