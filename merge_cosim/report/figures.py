@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from merge_cosim.report import canvas, case_figures, outcome_figures, page_data, set_figures, tables
 from merge_cosim.report.chapters import Chapter
 from merge_cosim.report.export import file_stem, write_tables
+from merge_cosim.report.failure_shares import failure_shares
 from merge_cosim.report.methods import looks
 from merge_cosim.report.page import Report, read_report
 
@@ -134,7 +135,7 @@ def _cases(report: Report, drawn: Any) -> Iterator[Drawing]:
 
 
 def _cells(rows: pd.DataFrame) -> pd.DataFrame:
-    shares = set_figures.failure_shares(rows)
+    shares = failure_shares(rows)
     index = pd.MultiIndex.from_product([shares.hosts, shares.mergings], names=["host_speed", "merging_speed"])
     cells = [
         pd.DataFrame(

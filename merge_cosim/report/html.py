@@ -6,13 +6,14 @@ import base64
 import io
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
-from matplotlib.figure import Figure
 
 from merge_cosim.core import colors
-from merge_cosim.report.canvas import style
+
+if TYPE_CHECKING:  # a report has no figure of matplotlib, whose import takes a fifth of its time
+    from matplotlib.figure import Figure
 
 DPI = 96
 """CSS pixels per inch."""
@@ -42,6 +43,8 @@ class Picture:
 
 def data_uri(figure: Figure) -> str:
     """The figure as SVG in a data URI, the same bytes for the same figure."""
+    from merge_cosim.report.canvas import style
+
     buffer = io.BytesIO()
     with style():
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})

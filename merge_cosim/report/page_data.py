@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
+from merge_cosim.report.failure_shares import failure_shares
 from merge_cosim.report.methods import Look, in_order
-from merge_cosim.report.set_figures import failure_shares
 from merge_cosim.results.statistics import belief, calibration
 from merge_cosim.results.statistics.rates import bootstrap_means
 from merge_cosim.results.statistics.summary import ALL_STARTS, AMBIGUITY_EDGES, is_sample

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,9 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from merge_cosim.core import colors
-from merge_cosim.core.units import FloatArray, IntArray
+from merge_cosim.core.units import FloatArray
 from merge_cosim.report import canvas
+from merge_cosim.report.failure_shares import failure_shares
 from merge_cosim.report.methods import Look, broken, in_order
 from merge_cosim.results.statistics.summary import ALL_SITES, AMBIGUITY_EDGES
 
@@ -22,52 +22,10 @@ SHOWN = 0.95
 """Share of the cases inside the axes, of those in which the host arrived; the rest is drawn at the edges."""
 LEAST_RANGE = 1.0
 """Smallest range of the delays [s]."""
-MOST_SPEEDS = 40
-"""With more different speeds than this a failure map has classes of speeds."""
-CLASSES, CASES_EACH = (1.0, 2.0, 5.0), 5
-"""Widths of these classes [m/s]: the smallest that leaves so many cases for each pair of them."""
 LEAST_TOP = 1.0
 """Smallest upper end of an axis of failures [%]."""
 MOST_NUMBERS = 24
 """Most bars that carry their number."""
-
-
-@dataclass(frozen=True)
-class Shares:
-    """Counts of cases by both initial speeds.
-
-    Attributes:
-        hosts, mergings: The speeds, or the middles of their classes [m/s], ascending.
-        n, failed, absent: For each method the cases of a cell, those that failed, and those whose host did not arrive
-            in time, shape (hosts, mergings).
-    """
-
-    hosts: FloatArray
-    mergings: FloatArray
-    n: dict[str, IntArray]
-    failed: dict[str, IntArray]
-    absent: dict[str, IntArray]
-
-
-def failure_shares(results: pd.DataFrame) -> Shares:
-    """Count the failures of each method by both initial speeds, in classes where there are many speeds.
-
-    Args:
-        results: Rows of one scenario.
-    """
-    speeds = results[["host_speed_0", "merging_speed_0"]].set_axis(["host", "merging"], axis=1)
-    if speeds.nunique().max() > MOST_SPEEDS:
-        speeds = _classes(speeds, len(results) / results["method"].nunique())
-    hosts, host = np.unique(speeds["host"].to_numpy(dtype=float), return_inverse=True)
-    mergings, merging = np.unique(speeds["merging"].to_numpy(dtype=float), return_inverse=True)
-    cell = host * len(mergings) + merging
-    counts: tuple[dict[str, IntArray], ...] = ({}, {}, {})
-    for method in in_order(results["method"]):
-        own = (results["method"] == method).to_numpy()
-        marks = own, own & results["failed"].to_numpy(dtype=bool), own & ~results["host_reached"].to_numpy(dtype=bool)
-        for found, mark in zip(counts, marks, strict=True):
-            found[method] = np.bincount(cell[mark], minlength=len(hosts) * len(mergings)).reshape(len(hosts), -1)
-    return Shares(hosts, mergings, *counts)
 
 
 def failure_map(results: pd.DataFrame) -> Figure:
@@ -187,13 +145,6 @@ def _bars(ax: Any, i: int, n: int, rate: FloatArray, low: FloatArray, high: Floa
     elif n * len(rate) <= MOST_NUMBERS:
         for place, height in zip(x, rate, strict=True):
             ax.annotate(f"{height:.1f}", (place, height), (0, 1), textcoords="offset points", ha="center", fontsize=7)
-
-
-def _classes(speeds: pd.DataFrame, cases: float) -> pd.DataFrame:
-    """The middles of the classes that speeds [m/s] are in, of so many cases under each method."""
-    area = float(np.prod(np.ptp(speeds.to_numpy(dtype=float), axis=0)))
-    width = next((one for one in CLASSES if area / one**2 * CASES_EACH <= cases), CLASSES[-1])
-    return (speeds // width + 0.5) * width
 
 
 def _edges(middles: FloatArray) -> FloatArray:
