@@ -1,4 +1,4 @@
-"""`merge_cosim.run`: one case alone, with every cycle recorded."""
+"""`merge_cosim.run`: a single case, with every cycle recorded."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def run(
     stays: bool = True,
     unchecked_ramp: bool = False,
 ) -> Run:
-    """Run one case alone; its outcome is the same as in a sweep.
+    """Run a single case; its outcome is the same as in a sweep.
 
     Example:
         >>> run = mc.run("designed-2", case="d+1_h15_m14", method="pgm")  # doctest: +SKIP

@@ -58,7 +58,7 @@ def _few(task: Task, cases: int) -> Task:
 
 
 def _cpu_us(task: Task, session: WorkerSession) -> tuple[float, float]:
-    """Processor time of everything, and wall time of estimating and controlling alone."""
+    """Processor time of everything, and wall time of only estimating and controlling."""
     begin, steps, method = process_time(), 0, 0.0
     for first in range(0, len(task), task.most):
         _, effort = task.part(first, min(first + task.most, len(task))).run(session)

@@ -210,7 +210,7 @@ def run(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Run one case alone; its outcome is the same as in a sweep."""
+    """Run a single case; its outcome is the same as in a sweep."""
     from merge_cosim.api.run import run as run_case
     from merge_cosim.report.story import story
     from merge_cosim.scenarios.settings import parse_setting

@@ -67,7 +67,7 @@ def summary(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
     wide: Wide = False,
     columns: Columns = None,
-    verdict: Annotated[bool, typer.Option("--verdict", help="Show the verdicts alone.")] = False,
+    verdict: Annotated[bool, typer.Option("--verdict", help="Show only the verdicts.")] = False,
     json: Json = False,
 ) -> None:
     """Show the table and the verdict of a finished sweep again."""

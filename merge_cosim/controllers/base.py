@@ -17,7 +17,7 @@ class Controller(Component):
     """Computes the host's acceleration from observation and log-odds; parameters are dataclass fields.
 
     Attributes:
-        default_estimator: Estimator of the method that is made of a controller alone.
+        default_estimator: Estimator of a method that is named by its controller only.
     """
 
     default_estimator: ClassVar[str] = "acc"
@@ -28,7 +28,7 @@ class Controller(Component):
         return ()
 
     def taken_from(self, estimator: Estimator) -> dict[str, Any]:
-        """Parameters that are the estimator's where the two are paired, by name: they are set there alone."""
+        """Parameters, by name, whose values are the estimator's where the two are paired; they are set only there."""
         return {}
 
     def pair(self, estimator: Estimator) -> None:

@@ -21,7 +21,7 @@ class Estimator(Component):
     the batch: no matrix products and no sums along the batch axis.
 
     Attributes:
-        default_controller: Controller of the method that is called by the estimator's name alone.
+        default_controller: Controller of a method that is named by its estimator only.
         needs_model: `use` must be called with a trained model before `start`.
         needs_label: It looks at the label, so it is a reference and no method.
     """

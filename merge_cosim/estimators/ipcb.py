@@ -1,4 +1,4 @@
-"""iPCB's estimate: the intention from the acceleration of the present moment alone."""
+"""iPCB's estimate: the intention from only the present acceleration."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Ipcb(IntendedAcceleration, Estimator):
 
     `log-odds = [(a - mu_Y)^2 - (a - mu_N)^2] / (2 sigma^2) + log P(N) / P(Y)` with `a = (V_t - V_{t-1}) / dt` and the
     same sigma for both intentions. Nothing earlier is remembered, which Dong, Dolan, Litkouhi 2017 (Fig. 3) call its
-    weakness. In an encounter's first cycle there is no acceleration yet, so the prior stands alone. The prior is the
+    weakness. In an encounter's first cycle there is no acceleration yet, so only the prior counts. The prior is the
     model's, as for every estimator with one.
 
     Attributes:

@@ -22,7 +22,7 @@ class GraphicalModel(Estimator):
     """The graph that PGM and PGM-G share; they differ in P(V_t | V_{t-1}, I).
 
     Attributes:
-        nodes: Number n of speed nodes; 1 leaves time and prior alone.
+        nodes: Number n of speed nodes; 1 leaves only time and prior.
         alpha: Weight of the speed term. Eq. 4's alpha is P(V_1), a term common to both intentions; as a factor it
             tempers correlated evidence.
         time_weight: Weight of the time term.

@@ -21,7 +21,7 @@ SIZE, DOTS = (8.0, 2.2), 100
 BEHIND, AHEAD = 100.0, 60.0
 """What is shown behind and ahead of the host [m]."""
 ANGLE = np.radians(7.0)
-"""Between ramp and main road, for the eye alone: what is simulated are the ways to the merging point."""
+"""Between ramp and main road, only to be seen: what is simulated are the ways to the merging point."""
 LANE, WIDTH = 3.7, 1.9
 """Width of a lane and of a car [m]."""
 FAR = 2000.0

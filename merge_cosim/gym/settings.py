@@ -95,7 +95,7 @@ class Options:
         """The encounters and what belongs to them, as a sweep has them.
 
         Raises:
-            UserError: An option is wrong, or the scenario is none of pairs alone.
+            UserError: An option is wrong, or the scenario is not of pairs only.
         """
         checked(self.observation)
         if self.action not in ("acceleration", "decision"):

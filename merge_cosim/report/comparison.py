@@ -143,9 +143,9 @@ def _differences(folders: list[ResultFolder], frames: list[pd.DataFrame], every:
         return lines
     for folder, frame, other in zip(folders, frames, frames[::-1], strict=True):
         mine, theirs = (set(one[["scenario", "method"]].itertuples(index=False, name=None)) for one in (frame, other))
-        alone = sorted(mine - theirs)
-        if alone:
-            lines.append(f"only in {folder.path}: " + ", ".join(f"{scenario} {method}" for scenario, method in alone))
+        only = sorted(mine - theirs)
+        if only:
+            lines.append(f"only in {folder.path}: " + ", ".join(f"{scenario} {method}" for scenario, method in only))
     return lines
 
 

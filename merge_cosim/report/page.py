@@ -126,7 +126,7 @@ def report_page(report: Report, note_lines: Sequence[str] = (), brief: bool = Fa
     Args:
         report: Its content.
         note_lines: Notes on the results, such as events in living traffic.
-        brief: The charts alone, with no more than `BRIEF_CASES` recorded cases of each chapter, for a notebook.
+        brief: Only the charts, with no more than `BRIEF_CASES` recorded cases of each chapter, for a notebook.
     """
     recorded = report.recorded
     tests = {one.key: one.data for one in report.chapters}

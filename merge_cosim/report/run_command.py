@@ -1,4 +1,4 @@
-"""The command that runs a case of a result folder alone."""
+"""The command that runs a single case of a result folder."""
 
 from __future__ import annotations
 

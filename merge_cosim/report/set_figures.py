@@ -148,7 +148,7 @@ def _bars(ax: Any, i: int, n: int, rate: FloatArray, low: FloatArray, high: Floa
 
 
 def _edges(middles: FloatArray) -> FloatArray:
-    """Borders of cells around their middles, half-way between neighbours; of one alone half a m/s on each side."""
+    """Borders of cells, half-way between their middles; a single cell reaches half a m/s to each side."""
     if len(middles) == 1:
         return middles[0] + np.array([-0.5, 0.5])
     between = (middles[1:] + middles[:-1]) / 2

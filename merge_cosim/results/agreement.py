@@ -14,7 +14,7 @@ NAMES = [name for name, _ in KEY]
 OTHER_WORLD = 1e-4
 """Largest difference of a measure between SUMO and the closed form, absolute, or relative where it is above 1."""
 BY_WORLD = ("world", "sumo_collision")
-"""Columns that differ between worlds: what moved the cars, and what SUMO alone reports."""
+"""Columns that differ between worlds: what moved the cars, and what only SUMO reports."""
 IS_THERE = "(is there)"
 """Stands for a column: whether both have the row."""
 AGAIN = "|again"
@@ -27,7 +27,7 @@ def agreement(stored: pd.DataFrame, again: pd.DataFrame, tolerance: float | None
 
     Args:
         stored: The stored rows.
-        again: The rows of the second run; cases of one set alone count as differences.
+        again: The rows of the second run; cases in only one of the two count as differences.
         tolerance: Largest difference of a measure, absolute, or relative where it is above 1; if not given,
             `OTHER_WORLD` where another world moved the cars, else 0.
 

@@ -78,7 +78,7 @@ class TraceFile:
 
     def _check(self) -> None:
         held = read_schema(self._file)
-        if len(held) > len(NO_RECORDS.columns):  # of living traffic alone there may be no record
+        if len(held) > len(NO_RECORDS.columns):  # a sweep of living traffic may have no record
             require(self._file, held, _TRACE)
 
     def recorded(self) -> pd.DataFrame:

@@ -48,7 +48,7 @@ class Scenario(Strict):
         merging: The merging car's `model` and its parameters.
         sensing: The `model` of what the host observes of the merging car, and its parameters. Parameters without a
             model are those of `noisy`; an empty table is `perfect`.
-        full_scene: How all other logged cars take part; None for host and merging car alone.
+        full_scene: How all other logged cars take part; None for host and merging car only.
         test: How an encounter is scored.
         speed_limit: Speed limit [m/s]; the ramp's own if not given.
         host: Where the automated car, the host, drives: on the `main` road or on the `ramp`. The other car, which the

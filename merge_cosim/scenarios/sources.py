@@ -167,7 +167,7 @@ class Pairs(Strict):
 
 
 class ByArrival(Strict):
-    """Seeded random initial states (Designed Test III); a case's state depends on its number and the seed alone.
+    """Seeded random initial states (Designed Test III); a case's state depends only on its number and the seed.
 
     Both cars start within the same spans of way and speed. The merging car's state is uniform over them. The difference
     of the times to arrival, T_m - T_h, is uniform from -`max_lead` to `max_lead`, and the host's speed is uniform over

@@ -17,7 +17,7 @@ MEASURES = ("min_leader_gap_m", "min_leader_ttc_s", "min_follower_gap_m")
 def surroundings(tracks: Tracks) -> dict[str, FloatArray]:
     """Smallest gaps to leader and follower [m], smallest time to collision with the leader [s]; shape (m,) each.
 
-    Inf without such a car, or where the host never closed in on it. Empty for tracks of two cars alone.
+    Inf without such a car, or where the host never closed in on it. Empty for tracks of two cars without others.
     """
     if LEADER_GAP not in tracks.around:
         return {}

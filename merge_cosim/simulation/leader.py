@@ -39,6 +39,6 @@ class LeaderRule:
         behind = self.law.clip(self.law.follow(np.where(led, gap, 0.0), speed, leader_speed))
         return np.where(led, np.minimum(acceleration, behind), acceleration)
 
-    def alone(self, speed: FloatArray, leader: FloatArray) -> FloatArray:
+    def without_merging_car(self, speed: FloatArray, leader: FloatArray) -> FloatArray:
         """Acceleration [m/s^2] of a host without a merging car: free, and no more than behind its leader."""
         return self.cap(self.law.clip(self.law.free(speed, self._limit)), speed, leader)

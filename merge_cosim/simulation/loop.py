@@ -141,8 +141,8 @@ class Loop:
         self._make_room()
         self._effort, self._stepped = Effort(), world.step_s
         self._over: dict[int, FloatArray] = {}
-        alone = encounters is not None and world.slots >= len(encounters)
-        self._last = np.full(world.slots, -1) if alone and traced == () else None
+        slot_each = encounters is not None and world.slots >= len(encounters)
+        self._last = np.full(world.slots, -1) if slot_each and traced == () else None
         """The last cycle in each slot, where every encounter has one to itself: then the recorder holds them all."""
         self._cases = np.zeros(world.slots, dtype=np.int64)
         self._columns: dict[str, AnyArray] = {}

@@ -103,9 +103,9 @@ def bounds(scenario: Scenario, encounters: Encounters, search: Search | None = F
     """Bound what a host can reach in each case.
 
     Args:
-        scenario: Two cars alone.
+        scenario: A scenario of two cars, without traffic.
         encounters: Its cases.
-        search: How finely paths are searched; None for full throttle alone, which against a log is all that is needed.
+        search: How finely paths are searched; None for full throttle only, which is enough against a log.
 
     Returns:
         One row per case: `scenario`, `site`, `source`, `case`; `by_throttle`, `by_braking`, and `feasible`, that one of

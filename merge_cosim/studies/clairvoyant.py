@@ -74,7 +74,7 @@ def search_plans(
 
     Args:
         encounters: The n cases.
-        merging_car: How the merging cars drive; what it remembers may depend on case and cycle alone.
+        merging_car: How the merging cars drive; what it remembers may depend only on case and cycle.
         rules: When an encounter is scored.
         setting: Speed limit and cycle.
         search: How finely.

@@ -57,7 +57,7 @@ class SumoOptions:
         seed: SUMO's seed.
         extra: Further options as SUMO's command line has them.
         profile: The options that are always set in runs of this kind.
-        configuration: A configuration that names the net and the routes; None for a net alone.
+        configuration: A configuration that names the net and the routes; None for a net without routes.
     """
 
     net: Path

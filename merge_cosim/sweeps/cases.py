@@ -159,7 +159,7 @@ class Cases(ABC):
 
 @dataclass(frozen=True)
 class PairCases(Cases):
-    """Encounters of a host and a merging car alone.
+    """Encounters of a host and a merging car without other cars.
 
     Attributes:
         pairs: The encounters.

@@ -28,7 +28,7 @@ RECORD_BYTES = 1 << 28
 
 @dataclass(frozen=True)
 class ClosedFormCases(PairCases):
-    """Encounters of a host and a merging car alone, without SUMO.
+    """Encounters of a host and a merging car without other cars, in the closed form.
 
     Attributes:
         side_by_side: Most of them that run at a time.

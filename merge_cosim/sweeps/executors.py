@@ -84,8 +84,8 @@ class Processes:
 
     def __init__(self, jobs: int, plugins: Sequence[Path] = (), start: StartMethod = "spawn") -> None:
         if start == "auto":
-            alone = sys.platform == "linux" and not plugins and threading.active_count() == 1
-            start = "fork" if alone else "spawn"
+            only_thread = sys.platform == "linux" and not plugins and threading.active_count() == 1
+            start = "fork" if only_thread else "spawn"
         if start not in multiprocessing.get_all_start_methods():
             raise UserError(f"--start {start}: this system cannot; use --start spawn")
         if start == "fork" and threading.active_count() > 1:

@@ -24,7 +24,7 @@ def other_cars(task: Task, case: str) -> pd.DataFrame | None:
     """Where the other cars are in every cycle but the first.
 
     Args:
-        task: The task of the case alone.
+        task: The task of only this case.
         case: Its name.
 
     Returns:

@@ -288,17 +288,18 @@ def _by_source(
 ) -> Iterator[tuple[str, PairCases]]:
     """The cases of each source."""
 
-    def alone(pairs: Encounters | RandomStates) -> PairCases:
+    def without_traffic(pairs: Encounters | RandomStates) -> PairCases:
         if request.world == "closed-form":
             return ClosedFormCases(pairs, host=scenario.host, side_by_side=side_by_side(scenario.test))
         return PairCases(pairs, host=scenario.host)
 
     if isinstance(encounters, RandomStates):
-        yield RANDOM, alone(encounters)
+        yield RANDOM, without_traffic(encounters)
         return
     for source in dict.fromkeys(encounters.source.tolist()):
         chosen = _taken(encounters, np.flatnonzero(encounters.source == source))
-        yield source, alone(chosen) if scenario.full_scene is None else _in_scenes(scenario, chosen, source, request)
+        in_scenes = scenario.full_scene is not None
+        yield source, _in_scenes(scenario, chosen, source, request) if in_scenes else without_traffic(chosen)
 
 
 def _in_scenes(scenario: Scenario, encounters: Encounters, source: str, request: SweepRequest) -> LoggedCases:

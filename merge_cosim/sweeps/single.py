@@ -1,4 +1,4 @@
-"""One case alone: the same outcome as in a sweep, with every cycle recorded, or shown in sumo-gui."""
+"""A single case: the same outcome as in a sweep, with every cycle recorded, or shown in sumo-gui."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def trace_case(
 
 
 def case_alone(tasks: list[Task], case: str) -> Task:
-    """The task of one case alone.
+    """The task of a single case.
 
     Raises:
         UserError: No task has such a case.
@@ -109,7 +109,7 @@ def trace_methods(request: SweepRequest, case: str) -> tuple[pd.DataFrame, dict[
 def export_case(request: SweepRequest, case: str, out: Path) -> Path:
     """Write one case of one scenario as SUMO files into a folder; returns the `.sumocfg`.
 
-    The scenes of living traffic differ by SUMO's seed alone.
+    The scenes of living traffic differ only by SUMO's seed.
 
     Raises:
         UserError: There is no such case, it is a SUMO configuration already, or its traffic drives on several copies of

@@ -17,7 +17,7 @@ SINGLE_CASES = 5
 def time_single_cases(tasks: Sequence[Task]) -> dict[str, float]:
     """Time of one update in a batch of one [us], by method.
 
-    Living traffic is left out: its encounters cannot be run alone.
+    Living traffic is left out: its encounters cannot be run one at a time.
 
     Args:
         tasks: What was run.

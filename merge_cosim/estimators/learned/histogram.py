@@ -77,7 +77,7 @@ class SpeedHistogram:
         """Mix each row with a background that both intentions share, so that an unseen transition says little.
 
         `P(j|i, I) = (1 - eps) n_I(ij) / n_I(i) + eps Q(j|i)`; Q pools both intentions under a kernel of one bin and
-        stands alone where either intention has never been seen in a row. (With additive counts every unseen
+        is all there is where either intention has never been seen in a row. (With additive counts every unseen
         transition would speak for the rarer intention.)
         """
         background = _normalised_rows(blurred(self.counts.sum(axis=0).astype(np.float64)))

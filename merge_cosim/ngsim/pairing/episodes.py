@@ -28,7 +28,7 @@ def read_episodes(path: Path, site: Site, rules: PairRules, first: int = 0) -> P
 
 
 def episode_tracks(path: Path, site: Site, rules: PairRules, first: int = 0) -> Tracks:
-    """Read the cars of the episodes: the merging car, in the host lane in its last row alone, and its neighbours there.
+    """Read the cars of the episodes: the merging car, in the host lane only in its last row, and its neighbours there.
 
     Every length is missing. The episodes' positions carry no jitter (their second differences are as small as those
     of smoothed NGSIM positions, half of raw ones), so all are flagged `smoothed_source`.

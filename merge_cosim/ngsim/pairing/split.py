@@ -50,5 +50,5 @@ def folds_of(encounters: Encounters, folds: int, seed: int = 0) -> IntArray:
 
 
 def _shuffled(names: AnyArray, seed: int) -> list[str]:
-    """Different names in an order that depends on each name's hash and the seed alone."""
+    """Different names in an order that depends only on each name's hash and the seed."""
     return sorted(set(names.tolist()), key=lambda name: sha256(f"{seed}|{name}".encode()).digest())

@@ -85,7 +85,7 @@ def scores(log_odds: FloatArray, truth: BoolArray) -> dict[str, Any]:
 
 
 def auc(score: FloatArray, truth: BoolArray) -> float | None:
-    """Area under the ROC curve of a score for NOT_YIELD, by its ranks (ties count half); None for one label alone."""
+    """Area under the ROC curve of a score for NOT_YIELD, by its ranks (ties count half); None for a single label."""
     positive = int(truth.sum())
     pairs = positive * (len(truth) - positive)
     _, place, count = np.unique(np.nan_to_num(score), return_inverse=True, return_counts=True)

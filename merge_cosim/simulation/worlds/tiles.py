@@ -26,7 +26,7 @@ COLORS = (RGBA["host"], RGBA["merging"])
 class TiledWorld(GivenWorld):
     """SUMO drives the cars on disconnected copies of a ramp; they are added once and moved to each next start.
 
-    Stations come from SUMO's lane positions, which depend on a car's own start and speeds alone; the odometer would
+    Stations come from SUMO's lane positions, which depend only on a car's own start and speeds; the odometer would
     carry the rounding of all earlier encounters in its tile. Speeds are the way of a step over its time, which is what
     SUMO reports (a test compares the two), at half the calls. The closed form of the same commands runs beside it.
     """
