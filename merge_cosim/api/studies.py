@@ -220,10 +220,15 @@ def reproduce(
 
     Returns:
         The page, and the results of each sweep by its name.
+
+    Raises:
+        UserError: `out` is a file.
     """
+    from merge_cosim.core.files import refuse_file
     from merge_cosim.studies.papers.page import write_reproduction
     from merge_cosim.studies.reproduction import reproduce as run_studies
 
+    refuse_file(Path(out))
     folder = find_data(None if data is None else Path(data))
     with sweep_progress(progress) as report:
         studies = run_studies(folder, Path(out), jobs or os.cpu_count() or 1, seed, report, world)

@@ -13,6 +13,7 @@ from merge_cosim import __version__
 from merge_cosim.cli import lists, ngsim, ramp, results
 from merge_cosim.cli.interrupts import ended_by_signal
 from merge_cosim.cli.options import (
+    MOST_SEED,
     Against,
     Columns,
     Data,
@@ -302,7 +303,7 @@ def train(
     site: Annotated[str, typer.Option(help="Site to train on: a shipped ramp, or a folder with site.toml.")] = "us101",
     source: ForceSource = None,
     split: Annotated[Literal["car", "pair"], typer.Option(help="What is kept together on one side.")] = "car",
-    seed: Annotated[int, typer.Option(help="Seed of the split.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of the split.")] = 0,
     splits: Annotated[int, typer.Option(help="Train so many models, each on another third.", min=0)] = 0,
     folds: Annotated[int, typer.Option(help="Train so many models, each on all cars but one part's.", min=0)] = 0,
     everything: Annotated[bool, typer.Option("--all", help="Train on all pairs, none is left to judge.")] = False,

@@ -50,7 +50,9 @@ Against = Annotated[
     str | None, typer.Option(help="Method to compare the others with on the same cases; pgm if it was run.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
-Seed = Annotated[int, typer.Option(help="Seed of SUMO and of every random stream.")]
+MOST_SEED = 2**31 - 1
+"""Largest seed that SUMO takes."""
+Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of SUMO and of every random stream.")]
 ForceSource = Annotated[Source | None, typer.Option("--source", help="Force real data or the surrogate.")]
 World = Annotated[
     Literal["sumo", "closed-form"],

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from merge_cosim.cli.options import (
+    MOST_SEED,
     Against,
     Columns,
     Data,
@@ -162,7 +163,7 @@ def cases(
 def verify(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder of a sweep.")],
     share: Annotated[float, typer.Option(help="Share of the rows of each scenario, variation and method.")] = 0.05,
-    seed: Annotated[int, typer.Option(help="Seed of the choice of rows.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of the choice of rows.")] = 0,
     tolerance: Annotated[
         float | None,
         typer.Option(help="Largest difference of a measure; 1e-4 for rows of the closed form, else 0, if not given."),

@@ -39,6 +39,16 @@ def without_comma(file: Path) -> str:
     return str(file)
 
 
+def refuse_file(folder: Path) -> None:
+    """Refuse a file where results are to be written to a folder, before anything is run for it.
+
+    Raises:
+        UserError: It is one.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise UserError(f"{folder}: is a file; --out names a folder")
+
+
 def write_atomically(target: Path, content: bytes) -> None:
     """Write a file so that other processes see either the whole file or none."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=target.name)

@@ -86,8 +86,8 @@ class Registry(Generic[C]):
         """Make a class a dataclass with keyword parameters, unless it is one.
 
         Raises:
-            UserError: It does not inherit the role's base class, its name cannot be written in a setting or is that of
-                another class, or a method is missing or takes other arguments than it is called with.
+            UserError: It does not inherit the role's base class, it is frozen, its name cannot be written in a setting
+                or is that of another class, or a method is missing or takes other arguments than it is called with.
         """
         if not (isinstance(cls, type) and issubclass(cls, self.base)):
             given, base = getattr(cls, "__name__", cls), self.base.__name__
@@ -111,6 +111,8 @@ class Registry(Generic[C]):
                 except TypeError as error:
                     called = f"{name}{inspect.signature(theirs)}"
                     raise UserError(f"{_full_name(cls)}.{name}: {error}; it is called as {called}") from None
+        if getattr(vars(cls).get("__dataclass_params__"), "frozen", False):
+            raise UserError(f"{_full_name(cls)}: a frozen dataclass cannot keep its state; leave out frozen=True")
         return _as_dataclass(cls)
 
     def names(self) -> list[str]:

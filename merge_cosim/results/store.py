@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.files import refuse_file
 from merge_cosim.results.files import csv_rows, csv_table, read_json, write_text
 from merge_cosim.results.invariants import joined
 from merge_cosim.results.merged_rows import Rows
@@ -54,8 +55,7 @@ class ResultFolder:
         Raises:
             UserError: There is a sweep and neither option is set, or the sweep to resume is another one.
         """
-        if self.path.exists() and not self.path.is_dir():
-            raise UserError(f"{self.path}: is a file; --out names a folder")
+        refuse_file(self.path)
         if self.parts.begun:
             if not (resume or overwrite):
                 raise UserError(

@@ -167,6 +167,11 @@ def test_a_view_that_is_no_xml(tmp_path: Path) -> None:
             "Mine.update: too many positional arguments; it is called as update(",
         ),
         ("def update", "def updates", "Mine: it has no method 'update', which every estimator needs"),
+        (
+            "@estimators.register",
+            "@estimators.register\n@__import__('dataclasses').dataclass(frozen=True)",
+            "Mine: a frozen dataclass cannot",
+        ),
         ("return np.where", "return str #", "Mine: gives <class 'str'>, where 1 numbers are due"),
     ],
 )
@@ -250,3 +255,12 @@ def test_a_grid_without_an_end(tmp_path: Path, stands: str, written: str) -> Non
     (tmp_path / "s.toml").write_text(GRID.replace(stands, written))
     line = refused("run", "s.toml", "--case", "x", "--method", "acc", cwd=tmp_path)
     assert "s.toml: encounters: a grid of more than 10,000,000 cases; take longer steps" in line
+
+
+def test_a_seed_or_a_folder_that_cannot_be(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(GRID)
+    for words in (("sweep", "s.toml"), ("verify", "out"), ("train",), ("reproduce",)):
+        for seed in ("-1", str(2**31)):
+            assert "Invalid value for '--seed'" in refused(*words, "--seed", seed, cwd=tmp_path)
+    for command in (("sweep", "s.toml"), ("ngsim", "surrogate"), ("reproduce",)):  # before anything is simulated
+        assert "s.toml: is a file; --out names a folder" in refused(*command, "--out", "s.toml", cwd=tmp_path)

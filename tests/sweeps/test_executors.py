@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from contextlib import closing
+from multiprocessing import resource_tracker
 
 import psutil
 import pyarrow as pa
@@ -60,6 +61,7 @@ def test_processes_give_the_rows_of_one(expected, start):
 
 
 def test_workers_wait_for_the_next_queue_and_end_with_the_executor(expected):
+    resource_tracker.ensure_running()  # it stays
     before = set(psutil.Process().children())
     with closing(Processes(2, start="fork")) as executor:
         first = list(executor.run(ChunkQueue(chunks())))

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.files import cache_folder, from_cache
+from merge_cosim.core.files import cache_folder, from_cache, refuse_file
 from merge_cosim.core.programs import end_programs
 from merge_cosim.ngsim.sites import Site
 from merge_cosim.ngsim.sites import site as find_site
@@ -95,6 +95,7 @@ def export(site: Site, out: Path) -> Path:
     Raises:
         UserError: The folder cannot be written to.
     """
+    refuse_file(out)
     (made,) = surrogate_folder(site).iterdir()
     try:
         out.mkdir(parents=True, exist_ok=True)
