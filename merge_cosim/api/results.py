@@ -6,21 +6,26 @@ import ast
 import os
 import shutil
 import weakref
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from merge_cosim.api.plots import Plots
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
+from merge_cosim.core.units import BoolArray
 from merge_cosim.ngsim.data import find_data
 from merge_cosim.report.comparison import compare
 from merge_cosim.report.run_command import run_command
 from merge_cosim.results.notes import note_lines
+from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics.summary import CASE
 from merge_cosim.results.store import ENSEMBLE_CSV, MANIFEST, RIVALS_CSV, SUMMARY_JSON, ResultFolder
 
@@ -77,7 +82,7 @@ class Results:
     @property
     def methods(self) -> list[str]:
         """Names of the methods that have rows."""
-        return sorted(self.rows["method"].unique())
+        return sorted(pc.unique(self._store.results(["method"])["method"]).to_pylist())
 
     def summary(self) -> pd.DataFrame:
         """One row per scenario, variation, site, source and method; see docs/measures.md.
@@ -121,38 +126,40 @@ class Results:
         Raises:
             UserError: The condition cannot be read, names a column that there is not, or a method was not run.
         """
-        rows = self._where(where)
+        holds = None if where is None else self._where(where)
+        known = self.methods if fails or passes else []
         for name in (*fails, *passes):
-            if name not in self.methods:
-                raise UserError(f"{self.path}: no method '{name}' in these results{did_you_mean(name, self.methods)}")
-        bad = self.rows["failed"] | self.rows["stuck"] | self.rows["censored"]
-        for holds, names in ((self.rows["failed"], fails), (~bad, passes)):
-            for name in names:
-                chosen = self.rows[holds & (self.rows["method"] == name)]
-                rows = rows.merge(chosen[CASE].drop_duplicates(), on=CASE)
-        return rows[rows["method"].isin(fails or passes)].reset_index(drop=True) if fails or passes else rows
+            if name not in known:
+                raise UserError(f"{self.path}: no method '{name}' in these results{did_you_mean(name, known)}")
+        found, gaps, first = [SCHEMA.empty_table()], set[str](), 0
+        for rows in self._store.rows.all_batches():
+            gaps |= {name for name in rows.column_names if rows[name].null_count}
+            chosen = np.ones(len(rows), dtype=bool) if holds is None else holds[first : first + len(rows)]
+            if fails or passes:
+                chosen = chosen & _agree(rows, fails, passes)
+            first += len(rows)
+            found.append(rows.filter(pa.array(chosen)))
+        return _as_of_all(pa.concat_tables(found), gaps)
 
     def run_commands(self, rows: pd.DataFrame) -> list[str]:
         """The commands that run the cases of some rows again, one for each."""
         return [run_command(row, self.manifest) for row in rows.to_dict("records")]
 
-    def _where(self, where: str | None) -> pd.DataFrame:
-        if where is None:
-            return self.rows.copy()
+    def _where(self, where: str) -> BoolArray:
+        """Where a condition holds, shape (rows,): of all rows, as it may ask for a mean over them."""
         if _constant_part(where):
             raise UserError(f"where {where!r}: a part of it names no column; {EXAMPLE}")
+        rows = self._store.results(_columns_in(where)).to_pandas()
         try:
-            holds = self.rows.eval(where, engine="python", local_dict={}, global_dict={})
+            holds = rows.eval(where, engine="python", local_dict={}, global_dict={})
         except pd.errors.UndefinedVariableError as error:
             name = str(error).split("'")[1]
-            raise UserError(
-                f"where {where!r}: no column '{name}'{did_you_mean(name, self.rows.columns.tolist())}"
-            ) from None
+            raise UserError(f"where {where!r}: no column '{name}'{did_you_mean(name, SCHEMA.names)}") from None
         except Exception as error:  # pandas raises whatever its parser and numpy raise
             raise UserError(f"where {where!r}: {' '.join(str(error).split())}; {EXAMPLE}") from None
         if not (isinstance(holds, pd.Series) and pd.api.types.is_bool_dtype(holds)):
             raise UserError(f"where {where!r}: this is no condition; {EXAMPLE}")
-        return self.rows[holds].reset_index(drop=True)
+        return holds.to_numpy(dtype=bool)
 
     def compare(self, first: str, second: str, other: Results | None = None) -> pd.DataFrame:
         """Compare two methods on the cases that both were run on.
@@ -276,13 +283,14 @@ class Results:
         return write_figures(self.path, Path(out), width_cm, font_size, columns)
 
     def __len__(self) -> int:
-        return len(self.rows)
+        self._store.check()
+        return len(self._store.rows)
 
     def __repr__(self) -> str:
         from merge_cosim.report.text_table import as_text
 
         where = "" if self._temporary else f" in {self.path}"
-        return f"Results{where}: {len(self.rows):,} rows\n{as_text(self._tables())}"
+        return f"Results{where}: {len(self):,} rows\n{as_text(self._tables())}"
 
     def _repr_html_(self) -> str:
         """The table, the verdict, and the interactive charts of the report."""
@@ -316,6 +324,38 @@ def _constant_part(condition: str) -> bool:
     return not all(any(isinstance(part, ast.Name) for one in piece for part in ast.walk(one)) for piece in pieces)
 
 
+def _columns_in(condition: str) -> list[str]:
+    """The columns that a condition names; all, where it is not Python's syntax, which pandas extends."""
+    try:
+        names = {part.id for part in ast.walk(ast.parse(condition.strip(), mode="eval")) if isinstance(part, ast.Name)}
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return list(SCHEMA.names)
+    return [name for name in SCHEMA.names if name in names] or ["case"]
+
+
+def _agree(rows: pa.Table, fails: Sequence[str], passes: Sequence[str]) -> BoolArray:
+    """The rows of some whole cases that fail under some methods and pass under others, and are of the former."""
+    frame = rows.select([*CASE, "method", "failed", "stuck", "censored"]).to_pandas()
+    case = frame.groupby(CASE, sort=False).ngroup().to_numpy()
+    bad = frame["failed"] | frame["stuck"] | frame["censored"]
+    chosen: BoolArray = frame["method"].isin(fails or passes).to_numpy(dtype=bool)
+    for holds, names in ((frame["failed"], fails), (~bad, passes)):
+        for name in names:
+            chosen = chosen & np.isin(case, case[(holds & (frame["method"] == name)).to_numpy(dtype=bool)])
+    return chosen
+
+
+def _as_of_all(rows: pa.Table, gaps: Set[str]) -> pd.DataFrame:
+    """Some rows with the types that pandas gives to all of them, where some columns have gaps."""
+    frame = rows.to_pandas()
+    for name in gaps:
+        if not rows[name].null_count:
+            kind = rows.schema.field(name).type
+            if pa.types.is_boolean(kind) or pa.types.is_integer(kind):
+                frame[name] = frame[name].astype(object if pa.types.is_boolean(kind) else float)
+    return frame
+
+
 def load_results(folder: str | Path) -> Results:
     """Read a result folder.
 
@@ -329,5 +369,7 @@ def load_results(folder: str | Path) -> Results:
         UserError: There is no finished sweep, or another version of merge-cosim wrote it.
     """
     results = Results(folder)
-    len(results)  # damage shows now
+    len(results)
+    for _ in ResultFolder(results.path).rows.all_batches():
+        pass  # damage shows now
     return results

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import union_categoricals
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
@@ -44,14 +46,14 @@ def compare(first: Path, second: Path, methods: tuple[str, str] | None = None) -
         UserError: One of the folders holds no finished sweep, or not its method, or they share no case.
     """
     folders = [ResultFolder(path) for path in (first, second)]
-    frames = [folder.results().to_pandas() for folder in folders]
+    frames = _rows(folders)
     if methods is not None:
         frames = [_of_method(*one) for one in zip(frames, methods, (first, second), strict=True)]
     group = GROUP if methods is None else GROUP[:-1]
     paired = [frame[frame["source"] != TRAFFIC] for frame in frames]
     both = paired[0].merge(paired[1], on=[*group, "case"], suffixes=("_a", "_b"))
     starts = [both[[f"{name}_{side}" for name in STATES]].to_numpy(dtype=float) for side in "ab"]
-    same_start = np.isclose(*starts).all(axis=1)  # other seeds draw cases of the same names
+    same_start = np.isclose(starts[0], starts[1]).all(axis=1)  # other seeds draw cases of the same names
     others = int((~same_start).sum())
     both = both[same_start]
     if both.empty:
@@ -89,6 +91,18 @@ def compare(first: Path, second: Path, methods: tuple[str, str] | None = None) -
     if first != second:
         notes += _differences(folders, frames, methods is None)
     return Table.of(data, columns, apart, title), notes
+
+
+def _rows(folders: Sequence[ResultFolder]) -> list[pd.DataFrame]:
+    """What is compared of the rows of each folder, the names that repeat as categories in common."""
+    names = [*GROUP, "model"]
+    columns = [*names, "case", "car", "failed", "censored", *STATES, *MEASURES]
+    frames = [folder.results(columns).to_pandas(categories=names) for folder in folders]
+    for name in names:
+        known = union_categoricals([frame[name] for frame in frames]).categories
+        for frame in frames:
+            frame[name] = frame[name].cat.set_categories(known)
+    return frames
 
 
 def _of_method(rows: pd.DataFrame, method: str, folder: Path) -> pd.DataFrame:

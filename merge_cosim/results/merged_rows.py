@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.results.files import parquet_options, read_schema, read_table, replacing, require
+from merge_cosim.results.files import parquet_options, read_schema, read_table, readable, replacing, require
 from merge_cosim.results.parts import STRETCH_ROWS
 from merge_cosim.results.schema import SCHEMA, SCHEMA_VERSION, VERSION_KEY
 
@@ -62,12 +62,26 @@ class Rows:
             variation: The variation.
             columns: Columns to read beside `case`; None for all.
         """
+        own = (one for one in self.row_groups() if _group_of(*one) == (scenario, variation))
+        yield from self._in_whole_cases(own, columns)
+
+    def all_batches(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """All merged rows in their order, in batches of whole cases; see `batches`.
+
+        Raises:
+            UserError: They are damaged.
+        """
+        for _, groups in groupby(self.row_groups(), key=lambda one: _group_of(*one)):
+            yield from self._in_whole_cases(groups, columns)
+
+    def _in_whole_cases(
+        self, groups: Iterable[tuple[pq.ParquetFile, int]], columns: Sequence[str] | None
+    ) -> Iterator[pa.Table]:
         wanted = None if columns is None else [*dict.fromkeys(("case", *columns))]
         held: list[pa.Table] = []
-        for file, number in self.row_groups():
-            if _group_of(file, number) != (scenario, variation):
-                continue
-            held.append(file.read_row_group(number, columns=wanted))
+        for file, number in groups:
+            with readable(self._path):
+                held.append(file.read_row_group(number, columns=wanted))
             if sum(map(len, held)) >= BATCH_ROWS:
                 rows = pa.concat_tables(held)
                 whole = pc.not_equal(rows["case"], rows["case"][-1])  # the last case may go on in the next group
@@ -76,6 +90,10 @@ class Rows:
                     held = [rows.filter(pc.invert(whole))]
         if held:
             yield pa.concat_tables(held)
+
+    def __len__(self) -> int:
+        with readable(self._path):
+            return sum(pq.read_metadata(file).num_rows for file in self._files())
 
     def count(self, scenario: str, variation: str) -> int:
         """Number of merged rows of one scenario and variation."""

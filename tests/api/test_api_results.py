@@ -11,6 +11,7 @@ import merge_cosim as mc
 from merge_cosim.report.notebook import tables_html
 from merge_cosim.report.short_table import short_tables
 from merge_cosim.report.text_table import as_text
+from merge_cosim.results import merged_rows
 
 
 def test_rows_and_what_was_run(results):
@@ -50,6 +51,16 @@ def test_the_cases_for_which_a_condition_holds(results):
     assert failed["case"].tolist() == rows["case"][rows["failed"] & (rows["method"] == "pgm")].tolist()
     assert len(failed)
     assert len(results.cases()) == len(rows)
+
+
+def test_cases_that_fail_under_one_method_alone_batch_by_batch(results, monkeypatch):
+    monkeypatch.setattr(merged_rows, "BATCH_ROWS", 10)
+    monkeypatch.setattr(merged_rows, "STRETCH_ROWS", 10)
+    failed = results.rows.pivot(index="case", columns="method", values="failed")
+    alone = failed.index[failed["pgm"] & ~failed["acc"]].tolist()
+    found = results.cases("delay_s > delay_s.min()", fails=["pgm"], passes=["acc"])
+    assert found["case"].tolist() == alone
+    pd.testing.assert_frame_equal(results.cases(), results.rows)
 
 
 @pytest.mark.parametrize(
