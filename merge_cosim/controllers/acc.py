@@ -14,3 +14,4 @@ class Acc(DistanceKeeping, Following):
     """The papers' off-the-shelf distance keeping (Dong, Dolan, Litkouhi 2017); see `DistanceKeeping`."""
 
     name: ClassVar[str] = "acc"
+    memory = ()

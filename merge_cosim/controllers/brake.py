@@ -20,6 +20,7 @@ class Brake(Controller):
     """
 
     name: ClassVar[str] = "brake"
+    memory = ()
     min_acceleration: Braking = -4.0
 
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:

@@ -29,6 +29,7 @@ class Lqr(Following):
     """
 
     name: ClassVar[str] = "lqr"
+    memory = ()
     q_gap: PositiveFloat = 0.05
     q_speed: NonNegativeFloat = 0.3
     r: PositiveFloat = 1.0

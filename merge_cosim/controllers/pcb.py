@@ -49,6 +49,7 @@ class Pcb(IntendedAcceleration, Acc):
     """
 
     name: ClassVar[str] = "pcb"
+    memory = ()  # what the last command expected is made anew by each
     candidate_step: Annotated[float, Field(ge=0.01)] = 0.5
     steps: Count = 12
     step: PositiveFloat = 0.5

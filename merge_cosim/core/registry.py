@@ -21,9 +21,11 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar, dataclass_transform
 
+import numpy as np
 from pydantic import ConfigDict, PydanticInvalidForJsonSchema, TypeAdapter, ValidationError
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import IntArray
 
 LARGEST = 1e9
 """Largest number that a parameter can be: beyond it a sum in double precision is coarser than `units.TOLERANCE`."""
@@ -43,10 +45,13 @@ class Component(ABC):
     Attributes:
         name: The name by which the command line, scenarios and tables call it; `my-estimator` for a class
             `MyEstimator` that does not set it.
+        memory: Names of what it holds for each encounter of a batch: arrays with the encounters on their last axis, or
+            objects with a `thin` of their own. None: that is not known, so that a batch with it is never thinned out.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(allow_inf_nan=False, arbitrary_types_allowed=True)
     name: ClassVar[str]
+    memory: ClassVar[tuple[str, ...] | None] = None
 
     def __init_subclass__(cls) -> None:
         """Name the class after itself if it has no name of its own."""
@@ -57,6 +62,24 @@ class Component(ABC):
     def __new__(cls, *_: Any, **__: Any) -> Self:
         """Make an object; its class is a dataclass from then on."""
         return super().__new__(_as_dataclass(cls))
+
+    @property
+    def can_thin(self) -> bool:
+        """Whether `thin` is complete: no subclass of the class that names `memory` may hold more, nor is a user's."""
+        classes = type(self).__mro__
+        named = next(number for number, cls in enumerate(classes) if "memory" in vars(cls))
+        more = any({"start", "reset"} & vars(cls).keys() for cls in classes[:named])
+        own = type(self).__module__.partition(".")[0] == __name__.partition(".")[0]
+        return self.memory is not None and own and not more
+
+    def thin(self, rows: IntArray) -> None:
+        """Go on with the encounters at `rows` alone, in that order; shape (m,)."""
+        for name in self.memory or ():
+            held = getattr(self, name)
+            if isinstance(held, np.ndarray):
+                setattr(self, name, held.take(rows, axis=-1))
+            else:
+                held.thin(rows)
 
 
 def _as_dataclass(cls: type[C]) -> type[C]:

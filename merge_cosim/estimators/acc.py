@@ -14,6 +14,7 @@ class AccMerging(Estimator):
     """NOT_YIELD iff the merging car is not behind the host, `s_m - s_h >= -tol` (Dong, Dolan, Litkouhi 2017)."""
 
     name: ClassVar[str] = "acc"
+    memory = ()
 
     def update(self, seen: Observation) -> FloatArray:
         """Compare the stations."""

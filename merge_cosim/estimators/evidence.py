@@ -56,6 +56,11 @@ class SpeedEvidence:
         self._sum[rows] = 0.0
         self._terms[:, rows] = 0.0
 
+    def thin(self, rows: IntArray) -> None:
+        """Go on with the drivers at `rows` alone, in that order."""
+        self._begin, self._sum = self._begin[rows], self._sum[rows]
+        self._terms, self._speeds = (held.take(rows, axis=-1) for held in (self._terms, self._speeds))
+
     def add(self, speed: FloatArray) -> FloatArray:
         """Take in the speeds of one cycle [m/s] and return S_t; both of shape (n,)."""
         before = self._speeds[self._cycle % self._lag]

@@ -36,6 +36,7 @@ class FactorGraph(Estimator):
     """
 
     needs_model: ClassVar[bool] = True
+    memory = ("_speeds", "_blurred")
     frames: Count = 20
     forgetting: NonNegativeFloat = 0.1
     last_weight: NonNegativeFloat = 1.0

@@ -34,6 +34,7 @@ class Ipcb(IntendedAcceleration, Estimator):
     name: ClassVar[str] = "ipcb"
     default_controller: ClassVar[str] = "pcb"
     needs_model: ClassVar[bool] = True
+    memory = ("_last_speed",)
     sigma: PositiveFloat = 0.5
 
     def use(self, model: IntentionModel) -> None:

@@ -34,6 +34,7 @@ class GraphicalModel(Estimator):
     """
 
     needs_model: ClassVar[bool] = True
+    memory = ("_speeds",)
     nodes: Count = 52
     alpha: NonNegativeFloat = 1.0
     time_weight: NonNegativeFloat = 1.0

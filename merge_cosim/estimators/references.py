@@ -18,6 +18,7 @@ class AlwaysGo(Estimator):
     """Assumes YIELD for every driver, so the host drives freely until a car is in the lane ahead."""
 
     name: ClassVar[str] = "always-go"
+    memory = ()
 
     def update(self, seen: Observation) -> FloatArray:
         """YIELD in every cycle."""
@@ -30,6 +31,7 @@ class AlwaysYield(Estimator):
     """Assumes NOT_YIELD for every driver, so the host keeps distance to every merging car."""
 
     name: ClassVar[str] = "always-yield"
+    memory = ()
 
     def update(self, seen: Observation) -> FloatArray:
         """NOT_YIELD in every cycle."""
@@ -55,6 +57,7 @@ class OracleLabel(Estimator):
     """
 
     name: ClassVar[str] = "oracle-label"
+    memory = ("_labels",)
     needs_label: ClassVar[bool] = True
 
     def start(self, count: int, setting: Setting) -> None:

@@ -27,6 +27,7 @@ class Slot(Estimator):
     """
 
     name: ClassVar[str] = "slot"
+    memory = ()
     margin: NonNegativeFloat = 2.0
     min_acceleration: NonPositiveFloat = -4.0
     max_acceleration: NonNegativeFloat = 2.0
@@ -50,6 +51,7 @@ class SlotTime(Estimator):
     """The slot rule reduced to times to arrival: NOT_YIELD iff `T_m <= T_h`."""
 
     name: ClassVar[str] = "slot-time"
+    memory = ()
 
     def update(self, seen: Observation) -> FloatArray:
         """Compare the times to arrival."""

@@ -27,6 +27,7 @@ class Designed(DistanceKeeping, MergingCar):
     """
 
     name: ClassVar[str] = "designed"
+    memory = ()
     headway: NonNegativeFloat = 1.0
     ahead: Ahead = "clear"
 

@@ -24,6 +24,7 @@ class Replay(MergingCar):
     """
 
     name: ClassVar[str] = "replay"
+    memory = ("_row_first", "_row_last")
 
     def start(self, encounters: Encounters, count: int, setting: Setting) -> None:
         """Take the logs.

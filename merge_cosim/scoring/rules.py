@@ -95,6 +95,10 @@ class Watch:
         self._until = np.append(self._until, np.full(more, NEVER))
         self._scored = np.append(self._scored, np.zeros(more, dtype=bool))
 
+    def thin(self, rows: IntArray) -> None:
+        """Go on with the encounters at `rows` alone, in that order."""
+        self._until, self._scored = self._until[rows], self._scored[rows]
+
     def reset(self, rows: IntArray, limit: IntArray) -> None:
         """Begin anew at `rows`, each to be scored until cycle `limit` at most."""
         self._until[rows] = np.minimum(limit, self._time_out)

@@ -13,6 +13,7 @@ class Perfect(Sensor):
     """The host observes the merging car as it is."""
 
     name: ClassVar[str] = "perfect"
+    memory = ()
 
     def observe(self, now: Observation) -> Observation:
         """The true state, without a copy."""

@@ -47,6 +47,16 @@ class HostDriver:
         """See `Estimator.rest`."""
         self.estimator.rest(rows)
 
+    @property
+    def can_thin(self) -> bool:
+        """Whether all its parts can leave out encounters."""
+        return self.sensor.can_thin and self.estimator.can_thin and self.controller.can_thin
+
+    def thin(self, rows: IntArray) -> None:
+        """See `Component.thin`."""
+        for part in (self.sensor, self.estimator, self.controller):
+            part.thin(rows)
+
     def decide(self, now: Observation) -> tuple[FloatArray, FloatArray]:
         """The log-odds of NOT_YIELD and the acceleration to command [m/s^2], shape (n,) each.
 
@@ -92,6 +102,12 @@ class DriverBlocks:
         """See `Estimator.rest`."""
         for number, block in enumerate(self._blocks):
             block.rest(rows[rows // self._size == number] - number * self._size)
+
+    def thin(self, rows: IntArray) -> None:
+        """See `Component.thin`; there is one block."""
+        (block,) = self._blocks
+        block.thin(rows)
+        self._size = len(rows)
 
     def decide(self, seen: Observation, active: BoolArray) -> tuple[FloatArray, FloatArray]:
         """See `HostDriver.decide`; blocks without an active slot are left out, and their entries mean nothing."""

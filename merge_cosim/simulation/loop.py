@@ -26,6 +26,8 @@ SCORED_TOGETHER = 128
 """Encounters that are over wait until so many can be scored in one go; their tracks then still fit the cache."""
 SCORED_IN_PLACE = 512
 """The same where the recorder holds all of them, and nothing else needs the cache meanwhile."""
+THINNED_AT, THINNED_FROM = 0.5, 512
+"""Share of slots in use below which the others are left out, and the slots from which on that pays."""
 
 
 @dataclass
@@ -144,7 +146,9 @@ class Loop:
         slot_each = encounters is not None and world.slots >= len(encounters)
         self._last = np.full(world.slots, -1) if slot_each and traced == () else None
         """The last cycle in each slot, where every encounter has one to itself: then the recorder holds them all."""
-        self._cases = np.zeros(world.slots, dtype=np.int64)
+        self._cases, self._origin = np.zeros(world.slots, dtype=np.int64), np.arange(world.slots)
+        """Case of each of those slots, and which of them each slot is since others have been left out."""
+        self._can_thin = world.can_thin and driver.can_thin and merging_car.can_thin and self._last is not None
         self._columns: dict[str, AnyArray] = {}
         self._broken: dict[str, BoolArray] = {}
         self._traces: dict[str, pd.DataFrame] = {}
@@ -157,6 +161,8 @@ class Loop:
             self.before_step()
             self._world.step()
             self.after_step()
+            if self._can_thin and THINNED_FROM < len(self._age) > np.count_nonzero(self._active) / THINNED_AT:
+                self._thin()
         run = self.finish()
         run.effort.wall_s, run.effort.cpu_s = perf_counter() - begin, process_time() - cpu
         return run
@@ -249,7 +255,8 @@ class Loop:
         valid, over_at = self._age[slots] - ended.back, self._over_at[slots]
         last = np.where(over_at >= 0, np.minimum(over_at, valid), valid)
         if self._last is not None:
-            self._last[slots], self._cases[slots] = last, ended.cases
+            before = self._origin[slots]
+            self._last[before], self._cases[before] = last, ended.cases
             return
         for number, (slot, case, end) in enumerate(
             zip(slots.tolist(), ended.cases.tolist(), last.tolist(), strict=True)
@@ -279,6 +286,15 @@ class Loop:
         tracks = Tracks.of(encounters, list(self._over), list(self._over.values()), self._world.channels)
         self._over.clear()
         self._take_scores(tracks)
+
+    def _thin(self) -> None:
+        """Leave out the slots of encounters that are over, so that a few long ones need not carry all others."""
+        slots = np.flatnonzero(self._active)
+        for part in (self._world, self._merging_car, self._driver, self._recorder, self._watch):
+            part.thin(slots)
+        self._age, self._over_at, self._origin = self._age[slots], self._over_at[slots], self._origin[slots]
+        self._active, self._open = self._active[slots], self._open[slots]
+        self._speeds = np.zeros((2, len(slots)))
 
     def _score_in_place(self, last: IntArray) -> None:
         """Score the encounters of a run in which each had a slot to itself, by neighbouring slots."""

@@ -34,22 +34,27 @@ class Recorder:
         """
         self.lengths = np.ones((2, slots))
         self._of_controller = RECORDED + channels
+        self._past: list[tuple[FloatArray, IntArray]] = []
+        self._columns = np.arange(slots)
+        """The slot that each column was before any `thin`; the same of the cycles before each is in `_past`."""
         self._use(np.zeros((longest + 1, self._of_controller + of_controller, slots)))
         self._now = 0
 
     def _use(self, cycles: FloatArray) -> None:
         self._cycles = cycles
-        shown = cycles.view()
-        shown.flags.writeable = False
-        self._seen = [
-            Observation(one[HOST_STATION], one[HOST_SPEED], one[MERGING_STATION], one[MERGING_SPEED], *self.lengths)
-            for one in shown
-        ]
+        self._shown = cycles.view()
+        self._shown.flags.writeable = False
+        self._seen: list[Observation | None] = [None] * len(cycles)
 
     @property
     def seen(self) -> Observation:
         """The present cycle; a view of the ring, so encounters that begin later in this cycle appear in it."""
-        return self._seen[self._now]
+        found = self._seen[self._now]
+        if found is None:
+            one = self._shown[self._now]
+            state = one[HOST_STATION], one[HOST_SPEED], one[MERGING_STATION], one[MERGING_SPEED]
+            found = self._seen[self._now] = Observation(*state, *self.lengths)
+        return found
 
     def decided(self, log_odds: FloatArray, command: FloatArray) -> None:
         """Keep the beliefs and the hosts' commanded speeds [m/s] of the present cycle, shape (slots,) each."""
@@ -87,17 +92,37 @@ class Recorder:
         rows = (HOST_STATION, HOST_SPEED, MERGING_STATION, MERGING_SPEED)
         return Observation(*(track[row] for row in rows), *lengths)
 
+    def thin(self, slots: IntArray) -> None:
+        """Go on with the encounters in `slots` alone, in that order, all of which began in the very first cycle."""
+        self._past.append((self._cycles[: self._now + 1], self._columns))
+        self._columns = self._columns[slots]
+        self.lengths = self.lengths[:, slots]
+        left = self._cycles[self._now :]
+        thinned = np.zeros((*left.shape[:2], len(slots)))
+        thinned[0] = left[0].take(slots, axis=1)
+        self._use(thinned)
+        self._now = 0
+
     def from_the_start(self, slots: slice, cycles: IntArray) -> FloatArray:
         """Records of some slots end to end, in each of which one encounter began in the very first cycle, (rows, N).
 
         Args:
-            slots: The k slots.
+            slots: The k slots, as they were before any `thin`, which must have kept their order.
             cycles: Cycles of each, shape (k,); the ring holds all of them.
         """
-        longest = int(cycles.max()) + 1
-        block = np.ascontiguousarray(self._cycles[:longest, :, slots].transpose(1, 2, 0))
-        held = np.flatnonzero(np.arange(longest) <= cycles[:, None])
-        return block.reshape(len(block), -1).take(held, axis=1)
+        longest, first = int(cycles.max()) + 1, 0
+        block = np.empty((self._cycles.shape[1], len(cycles), longest))
+        for held, columns in (*self._past, (self._cycles, self._columns)):
+            here = slice(*np.searchsorted(columns, (slots.start, slots.stop)).tolist())
+            part = held[: longest - first, :, here].transpose(1, 2, 0)
+            after = first + part.shape[2]
+            if part.shape[1] == len(cycles):
+                block[:, :, first:after] = part
+            else:
+                block[:, columns[here] - slots.start, first:after] = part
+            first = after - 1  # the cycle in which some were left out is in both records
+        wanted = np.flatnonzero(np.arange(longest) <= cycles[:, None])
+        return block.reshape(len(block), -1).take(wanted, axis=1)
 
     def make_room(self, slots: int, longest: int) -> None:
         """Grow to so many slots, and to encounters of so many cycles; what is recorded stays."""

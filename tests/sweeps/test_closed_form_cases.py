@@ -4,10 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from merge_cosim.controllers.rollout import Rollout
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT
+from merge_cosim.estimators.interactive import Interactive
+from merge_cosim.estimators.pgm import Pgm
 from merge_cosim.scenarios.random_states import RandomStates
+from merge_cosim.simulation import loop
 from merge_cosim.sweeps.closed_form_cases import RECORD_BYTES, ClosedFormCases
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.single import case_alone, trace_case
@@ -100,3 +104,26 @@ def test_a_window_is_refused():
     (task,) = tasks("designed-2", "closed-form", 1, ("acc",))
     with pytest.raises(UserError, match="--gui: not with --world closed-form"):
         trace_case(task, task.case(0), gui_delay=0)
+
+
+@pytest.mark.parametrize("method", ["acc", "pgm", "fg", "ipcb", "slot+lqr", "always-go"])
+def test_leaving_out_what_is_over_changes_no_row(method, monkeypatch):
+    (task,) = plan(SweepRequest(["designed-random"], [method], settings={"encounters.count": 150}, world="closed-form"))
+    thin, thinned = loop.Loop._thin, []
+    monkeypatch.setattr(loop.Loop, "_thin", lambda self: (thinned.append(len(self._age)), thin(self)))
+    expected, _ = task.run(WorkerSession())
+    assert not thinned
+    monkeypatch.setattr(loop, "THINNED_FROM", 10)
+    rows, _ = task.run(WorkerSession())
+    assert len(thinned) > 2
+    assert rows.equals(expected)
+
+
+def test_what_holds_more_than_it_names_is_not_thinned():
+    class Mine(Pgm):
+        """A user's."""
+
+    assert Pgm().can_thin
+    assert not Mine().can_thin
+    assert not Rollout().can_thin  # of `Acc`, which holds nothing
+    assert not Interactive().can_thin

@@ -78,6 +78,7 @@ class World(ABC):
     Attributes:
         kind: What moves the cars.
         channels: What is recorded of each encounter and cycle beside both cars' states.
+        can_thin: It can leave out slots in which nothing more begins, see `thin`.
         slots: Number of slots; it may grow.
         commanded: The hosts are driven by the method, so its bounds of acceleration are checked.
         step_s: Time [s] inside the simulator's steps, without the time to command and to read cars.
@@ -88,6 +89,7 @@ class World(ABC):
 
     kind: ClassVar[WorldKind] = "sumo"
     channels: ClassVar[tuple[str, ...]] = ()
+    can_thin: ClassVar[bool] = False
     commanded: ClassVar[bool] = True
     slots: int
     step_s: float = 0.0
@@ -143,6 +145,9 @@ class World(ABC):
             over: Slots of the encounters whose scoring ends with the present state.
             age: Cycles since each slot's encounter began, shape (slots,).
         """
+
+    def thin(self, slots: IntArray) -> None:
+        """Go on with the encounters in `slots` alone, in that order; no other encounter begins any more."""
 
     def finish(self, age: IntArray) -> Ended | None:
         """End what is still open when the run ends."""
@@ -216,6 +221,12 @@ class GivenWorld(World):
     def line_up(self, cases: IntArray) -> None:
         """Make these encounters, shape (m,), the only ones to begin from now on; they may have run before."""
         self._queue = cases
+
+    def thin(self, slots: IntArray) -> None:
+        """See `World`."""
+        self.slots = len(slots)
+        self._case, self.collided = self._case[slots], self.collided[slots]
+        self._free = np.zeros(0, dtype=np.int64)
 
     @property
     def encounters(self) -> Encounters:

@@ -31,6 +31,7 @@ class ClosedFormWorld(GivenWorld):
     """Moves one host and one merging car in each slot by the closed form."""
 
     kind: ClassVar[WorldKind] = "closed-form"
+    can_thin: ClassVar[bool] = True
 
     def __init__(self, slots: int) -> None:
         super().__init__(slots)
@@ -41,6 +42,11 @@ class ClosedFormWorld(GivenWorld):
         """See `GivenWorld`."""
         self._cars.state[:, slots] = self.encounters.start[:4, cases]
         return np.empty((0, len(slots)))
+
+    def thin(self, slots: IntArray) -> None:
+        """See `World`."""
+        super().thin(slots)
+        self._cars.state = self._cars.state.take(slots, axis=1)
 
     def command(self, speeds: FloatArray) -> None:
         """See `World`."""
