@@ -1,17 +1,25 @@
 """What the tests share: the real data where it is at hand, and a cache of their own."""
 
 import os
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 
 for library in ("OMP", "OPENBLAS"):  # before numpy is imported: the tests fill all cores, threads only cost time
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+# they start many processes, each of which would otherwise compile every module anew
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-settings.register_profile("unhurried", deadline=None)  # two processes of tests share two cores with SUMO
-settings.load_profile("unhurried")
+
+def pytest_configure() -> None:
+    """Two processes of tests share two cores with SUMO, so no example has a deadline."""
+    from hypothesis import settings
+
+    settings.register_profile("unhurried", deadline=None)
+    settings.load_profile("unhurried")
 
 
 @pytest.fixture(scope="session")
