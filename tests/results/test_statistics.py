@@ -14,7 +14,7 @@ from merge_cosim.results.statistics import belief, calibration, strata, summaris
 from merge_cosim.results.statistics.belief import scores
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.results.statistics.paired import mean_difference, sign_flip_p
-from merge_cosim.results.statistics.rates import bootstrap_means, percent, wilson
+from merge_cosim.results.statistics.rates import Moments, bootstrap_means, percent, wilson
 
 
 def test_wilson_against_its_formula():
@@ -119,6 +119,16 @@ def test_many_clusters_take_the_normal_approximation():
     for values in (few, many):
         ((low, high),) = bootstrap_means(values, pd.Series(np.arange(len(values))))
         assert (high - low) / 2 == pytest.approx(1.96 * 5 / len(values) ** 0.5, rel=0.1)
+
+
+def test_the_interval_of_a_ratio_from_its_formula():
+    sums, counts = np.array([1.0, 4.0, 2.5, 6.0]), np.array([1, 2, 1, 4])
+    ratio = 13.5 / 8
+    error = 1.959964 * np.sqrt(4 / 3 * np.sum((sums - ratio * counts) ** 2)) / 8
+    assert Moments.of(sums, counts).interval() == pytest.approx((ratio - error, ratio + error))
+    parts = (Moments.of(sums[part], counts[part]) for part in (slice(2), slice(2, 4)))
+    assert sum(parts, Moments(0, 0.0, 0.0, 0.0, 0.0, 0.0)).interval() == pytest.approx((ratio - error, ratio + error))
+    assert Moments.of(sums[:1], counts[:1]).interval() == Moments.of(sums, 0 * counts).interval() == (None, None)
 
 
 def test_missing_values_do_not_count_and_one_car_has_no_interval():

@@ -10,6 +10,7 @@ import pytest
 
 from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics import Summary, oracle_best, rates, summarise, totals
+from merge_cosim.results.statistics.summary import COLUMNS
 
 BASE = dict.fromkeys(SCHEMA.names) | {
     "scenario": "s",
@@ -135,6 +136,23 @@ def test_sites_are_pooled_only_within_one_source():
     assert summarise(one, {})["site"].tolist() == ["all", "i80", "us101"]
     two = frame({"case": "a", "method": "m"}, {"case": "b", "method": "m", "site": "i80", "source": "surrogate"})
     assert summarise(two, {})["site"].tolist() == ["i80", "us101"]
+
+
+def test_a_summary_needs_its_own_columns_alone_and_compares_within_a_test():
+    def rows(scenario, **failing):
+        same = {"scenario": scenario, "source": "random", "car": ""}
+        return [
+            same | {"case": f"{case}", "method": method, "failed": case in cases}
+            for method, cases in failing.items()
+            for case in range(6)
+        ]
+
+    first, second = rows("a", pgm=[0], acc=[0]), rows("b", pgm=[], acc=[1, 2, 3])
+    whole = summarise(frame(*first, *second), {}, "pgm")
+    pd.testing.assert_frame_equal(summarise(frame(*first, *second)[list(COLUMNS)], {}, "pgm"), whole)
+    for scenario, part in (("a", first), ("b", second)):
+        alone = summarise(frame(*part), {}, "pgm").reset_index(drop=True)
+        pd.testing.assert_frame_equal(whole[whole["scenario"] == scenario].reset_index(drop=True), alone)
 
 
 def test_a_fixed_grid_has_no_interval():

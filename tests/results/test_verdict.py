@@ -53,6 +53,15 @@ def test_many_methods_are_counted_after_the_first():
     )
 
 
+def test_a_single_one_is_not_counted_but_named():
+    methods = {f"m{i}": (100, i, 0, 1.0) for i in range(6)}
+    assert "; m3 3 (3.0 %); m4 4 (4.0 %); m5 5 (5.0 %). The" in verdict(_summary(**methods)).sentence
+    tied = {f"m{i}": (100, 1, 0, float(i)) for i in range(6)} | {"bad": (100, 9, 0, 1.0)}
+    assert verdict(_summary(**tied)).sentence.startswith("m0, m1, m2, m3 and 2 more fail least")
+    del tied["m5"]
+    assert verdict(_summary(**tied)).sentence.startswith("m0, m1, m2, m3 and m4 fail least")
+
+
 @pytest.mark.parametrize(
     ("methods", "sentence"),
     [
@@ -89,6 +98,13 @@ def test_a_sample_is_judged_on_the_same_cases():
     )
 
 
+def test_common_cases_decide_what_the_counts_alone_do_not():
+    summary = _summary("random", a=(40, 1, 0, 1.0), b=(40, 7, 0, 1.0))
+    assert fisher_exact([[1, 39], [7, 33]]).pvalue > 0.05 > 2 / 2**6  # McNemar's, of the six that fail under b alone
+    assert verdict(summary).undecided == ("b",)
+    assert verdict(summary, _rows("random", a=[0], b=range(7))).undecided == ()
+
+
 def test_without_common_cases_by_fishers_test():
     summary = _summary("traffic", a=(30, 0, 0, 1.0), b=(30, 6, 0, 1.0), c=(31, 20, 1, 1.0))
     assert fisher_exact([[0, 30], [6, 24]]).pvalue == pytest.approx(0.0237, abs=1e-4)
@@ -121,6 +137,13 @@ def test_one_verdict_for_each_site_and_the_rows_of_all_sites_together():
     assert all(one.undecided == () for one in found.values())
 
 
+def test_a_site_is_judged_on_its_own_cases():
+    summary = pd.concat([_summary("random", a=(40, 0, 0, 1.0), b=(40, 8, 0, 1.0)).assign(site=site) for site in "xy"])
+    there = _rows("random", a=range(8), b=[]).assign(site="y", case=lambda rows: rows["case"] + "y")
+    found = verdicts(summary, pd.concat([_rows("random", a=[], b=range(8)), there]))
+    assert found["s", "x", "random"].undecided == ()
+
+
 def _models(source, /, **shares):
     """Summary rows of methods with several models of 40 cases, from the failures under each; and their rows."""
     same = {"scenario": "s", "variation": "", "site": "x", "source": source, "n": 40, "stuck": 0, "delay_s": 1.0}
@@ -146,6 +169,11 @@ def test_a_method_with_several_models_is_judged_by_its_median_model():
         "a fails least: median 2.5 %, 0.0–5.0 % over 3 models of 40 cases; c median 7.5 %, 2.5–10.0 % over 3 models; "
         "b median 50.0 %, 25.0–75.0 % over 3 models. Which of a and c is better depends on the trained model."
     )
+
+
+def test_one_method_with_several_models_alone():
+    sentence = "a: median 2.5 %, 0.0–5.0 % over 3 models of 40 cases failed. No other method to compare with."
+    assert verdict(*_models("designed", a=[0, 2, 1])).sentence == sentence
 
 
 def test_of_a_sample_every_model_must_be_beyond_chance():
