@@ -75,6 +75,10 @@ class LaneMap:
         """X where an edge starts [m]; an edge off the two paths is the off-ramp, from the auxiliary lane's end on."""
         return self._starts.get(edge, self._ramp.auxiliary_end)
 
+    def merging_lane(self, edge: str) -> int:
+        """SUMO index of the auxiliary lane on an edge; beyond its end that of the host's lane."""
+        return next((section.lane for section in self._ramp.ramp if section.edge == edge), self.host_lane(edge))
+
     def host_lane(self, edge: str) -> int:
         """SUMO index of the host's lane on an edge of the main road."""
         for section in self._ramp.main:

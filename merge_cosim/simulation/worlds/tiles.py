@@ -168,7 +168,10 @@ class TiledWorld(GivenWorld):
         arrives = ~self._in_host_lane & (reached >= -TOLERANCE)
         for tile in np.flatnonzero(arrives).tolist():
             edge = self._lanes.place("main", max(float(reached[tile]), 0.0), float(self._merge_position[tile])).edge
-            self.session.change_lane(self._names[tile + self._by_ramp * self.slots], self._lanes.host_lane(edge))
+            name = self._names[tile + self._by_ramp * self.slots]
+            # Where a car enters another edge, SUMO adds to the commanded lane what the car's own number grows by.
+            grows = self._lanes.merging_lane(edge) - int(self.session.lane(name).rpartition("_")[2])
+            self.session.change_lane(name, self._lanes.host_lane(edge) - grows)
         self._in_host_lane |= arrives
 
     def _read(self) -> None:

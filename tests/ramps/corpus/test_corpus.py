@@ -14,7 +14,10 @@ from merge_cosim.ramps.create.from_net import ramp_from_net
 from merge_cosim.ramps.create.from_osm import ramp_from_osm, read_extract
 from merge_cosim.ramps.create.onramp import choose, read_source
 
-DRIVEN = ("exit 700 m after", "no limit, guessed lane", "left-hand traffic, exit after", "fan-out of both")
+DRIVEN = (
+    *("exit 700 m after", "no limit, guessed lane", "left-hand traffic, exit after", "fan-out of both"),
+    *("from the left", "hard shoulder"),
+)
 """Those that are also made, checked and driven, one of each kind."""
 
 
@@ -64,3 +67,4 @@ def test_it_is_made_passes_its_check_and_is_driven(tmp_path: Path, name: str) ->
     words = ("run", "designed-2", "--case", "d+1_h15_m14", "--set", f"ramp={folder}", "--method", "acc")
     done = merge_cosim(*words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+    assert "broken invariant" not in done.stdout
