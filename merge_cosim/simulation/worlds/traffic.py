@@ -167,8 +167,8 @@ class TrafficWorld(World):
         hosts = self._driven
         speed = np.array([host.speed for host in hosts])
         ahead = np.array([self._ahead[host.name] for host in hosts]).reshape(-1, 2).T
-        speeds = np.maximum(speed + self._leader_rule.without_merging_car(speed, ahead) * self._setting.dt, 0.0)
-        wanted = dict(zip((host.name for host in hosts), speeds.tolist(), strict=True))
+        free = np.maximum(speed + self._leader_rule.without_merging_car(speed, ahead) * self._setting.dt, 0.0)
+        wanted = dict(zip((host.name for host in hosts), free.tolist(), strict=True))
         for slot, meeting in self._by_slot.items():
             wanted[meeting.host.name] = min(wanted[meeting.host.name], float(speeds[0, slot]))
         for name, value in wanted.items():
