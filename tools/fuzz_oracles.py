@@ -184,15 +184,15 @@ def grid(encounters: Encounters, file: Path) -> None:
 
 def ramp(found: Ramp, net: Path, definition: Path) -> None:
     """Compare a ramp with its two files: the edges' lengths, one after the other, from the gore."""
-    told = tomllib.loads(definition.read_text())
-    same("speed limit", found.speed_limit, told["speed_limit"])
-    same("merging point", found.merging_point, told["merging_point"])
+    content = tomllib.loads(definition.read_text())
+    same("speed limit", found.speed_limit, content["speed_limit"])
+    same("merging point", found.merging_point, content["merging_point"])
     edges = {edge.get("id"): edge.findall("lane") for edge in etree.parse(net).getroot().iter("edge")}
     for key, lanes, sections in (("main", "host_lane", found.main), ("ramp", "merging_lane", found.ramp)):
-        same(f"edges of {key}", [one.edge for one in sections], told[key])
-        same(f"lanes of {key}", [one.lane for one in sections], told[lanes])
+        same(f"edges of {key}", [one.edge for one in sections], content[key])
+        same(f"lanes of {key}", [one.lane for one in sections], content[lanes])
         _lengths(sections, edges)
-    own = told["main"][: told["main"].index(told["gore"])]
+    own = content["main"][: content["main"].index(content["gore"])]
     same("gore", round(found.main[0].start, 6), -round(sum(float(edges[one][0].get("length")) for one in own), 6))
 
 
@@ -215,17 +215,17 @@ def routes(encounters: Encounters, file: Path, found: Ramp) -> None:
     cars: dict[str, list[tuple[str, float, float]]] = {"host": [], "merging": []}
     for vehicle in root.iter("vehicle"):
         kind = types.get(vehicle.get("type", ""))
-        told = {
+        content = {
             p.get("key"): p.get("value") for part in (kind, vehicle) if part is not None for p in part.iter("param")
         }
-        if "merge-cosim.role" in told:
+        if "merge-cosim.role" in content:
             own = vehicle.find("route")
             named = [one for one in root.iter("route") if one.get("id") == vehicle.get("route")]
             edge = (own if own is not None else named[-1]).get("edges", "").split()[0]
             section = next(one for one in (*found.main, *found.ramp) if one.edge == edge)
             position = float(vehicle.get("departPos", "nan"))
             x = section.start + position + (section.length if position < 0 else 0.0)
-            cars[str(told["merge-cosim.role"])].append(
+            cars[str(content["merge-cosim.role"])].append(
                 (vehicle.get("id", ""), round(x, 6), float(vehicle.get("departSpeed", "nan")))
             )
     pairs = list(zip(cars["host"], cars["merging"], strict=True))

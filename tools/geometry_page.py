@@ -160,15 +160,15 @@ def section(name: str, data: Path, docs: Path) -> str:
 
 def corrections(plan: Plan) -> str:
     """What the trajectories change of the drawn line, in words."""
-    told = []
+    shifts = []
     for number, each in plan.corrections.items():
         x = each.node + each.sign * np.linspace(0.0, each.seen, 50)
         largest = each.at(x)[np.abs(each.at(x)).argmax()]
-        told.append(
+        shifts.append(
             f"lane {number} by {each.cars} cars over {each.seen:.0f} m, at most {abs(largest):.2f} m to the "
             f"{'right' if largest > 0 else 'left'}"
         )
-    return f"Correction of the drawn line by the cars of even number: {'; '.join(told)}."
+    return f"Correction of the drawn line by the cars of even number: {'; '.join(shifts)}."
 
 
 HEAD = """\

@@ -23,7 +23,7 @@ from merge_cosim.ngsim.surrogate.recipe import RECIPES
 from merge_cosim.ngsim.surrogate.surrogate import cached_surrogate
 
 BANDS = ((0, 40), (40, 70), (70, 110), (110, np.inf))
-"""Distances to the lane change [m] by which the ambiguity of the order is told apart."""
+"""Distances to the lane change [m] by which the ambiguity of the order is grouped."""
 QUANTILES = (5, 50, 95)
 SHORT = {"seeds": (1,), "duration": 240.0, "warm_up": 60.0}
 """What a recipe has in short mode: one recording of a few minutes, of the first site alone."""
@@ -90,8 +90,8 @@ def auc(e: Encounters) -> list[float]:
     bands = [(low <= left) & (left < high) for low, high in BANDS]
     both = [len(np.unique(label[band])) == 2 for band in bands]  # few pairs may have one label only
     return [
-        float(roc_auc_score(label[band], (t_h - t_m)[band])) if told else np.nan
-        for band, told in zip(bands, both, strict=True)
+        float(roc_auc_score(label[band], (t_h - t_m)[band])) if judged else np.nan
+        for band, judged in zip(bands, both, strict=True)
     ]
 
 

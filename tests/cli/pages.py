@@ -81,13 +81,13 @@ def run(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     if program == "merge-cosim":
         return _merge_cosim(words, folder)
     if program == "make":
-        told = _process(["make", "--dry-run", *words, "VENV=venv", "BIN=."], ROOT)
-        for each in told.stdout.replace("\\\n", " ").splitlines():
+        dry_run = _process(["make", "--dry-run", *words, "VENV=venv", "BIN=."], ROOT)
+        for each in dry_run.stdout.replace("\\\n", " ").splitlines():
             if each.startswith("./merge-cosim "):
                 done = run(each.removeprefix("./"), folder)
                 if done.returncode:
                     return done
-        return told
+        return dry_run
     if program == "sumo-gui":
         return _process([sumolib.checkBinary("sumo"), "-c", *words, "--end", "30"], folder)
     if (program, words[0]) == ("pip", "install"):

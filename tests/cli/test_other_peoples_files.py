@@ -139,7 +139,7 @@ def test_a_file_that_sumo_misses_is_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("removed", ["true", "false"])
-def test_teleports_and_contacts_of_others_are_told_and_counted(tmp_path: Path, removed: str) -> None:
+def test_teleports_and_contacts_of_others_are_reported_and_counted(tmp_path: Path, removed: str) -> None:
     trouble = """
 <vehicle id="block" type="car" depart="0" departPos="300" departSpeed="0"><route edges="ramp weave main_out"/>
 <stop lane="ramp_0" endPos="310" duration="12"/></vehicle>
@@ -153,9 +153,9 @@ def test_teleports_and_contacts_of_others_are_told_and_counted(tmp_path: Path, r
     assert done.returncode == 0, done.stderr
     (traffic,) = table(tmp_path / "out" / "traffic.csv")
     notes = table(tmp_path / "out" / "notes.csv")
-    told = "SUMO took out a vehicle" if removed == "true" else "vehicle jam was teleported by SUMO"
+    note = "SUMO took out a vehicle" if removed == "true" else "vehicle jam was teleported by SUMO"
     for event, what in (
-        ("teleports", told),
+        ("teleports", note),
         ("other_contacts", "SUMO reports a contact of o1 and o2 on lane main_in_3"),
     ):
         lines = [note["what"] for note in notes if note["event"] == event]

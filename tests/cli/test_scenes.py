@@ -48,7 +48,7 @@ def minute(tmp_path_factory):
     return folder, out, done
 
 
-def test_meetings_become_rows_and_the_traffic_is_told_as_a_whole(minute):
+def test_meetings_become_rows_and_the_traffic_is_described_as_a_whole(minute):
     _, out, done = minute
     found = rows(out).to_pandas()
     assert set(found["source"]) == {"traffic"}
@@ -71,7 +71,7 @@ def test_meetings_become_rows_and_the_traffic_is_told_as_a_whole(minute):
     assert manifest["real_time_factor"] > 5
 
 
-def test_events_are_told_in_one_line_each_and_listed(minute):
+def test_events_are_reported_in_one_line_each_and_listed(minute):
     _, out, done = minute
     notes = table(out / "notes.csv")
     two_hosts = [note for note in notes if note["event"] == "two_hosts"]
@@ -231,7 +231,7 @@ def test_a_scene_without_a_car_that_is_to_merge_is_one_line(tmp_path, how, edge,
     assert "nothing to measure: no car came in that is to merge: " + why in done.stderr
 
 
-def test_hosts_that_never_depart_are_told(tmp_path):
+def test_hosts_that_never_depart_are_reported(tmp_path):
     blocked = '<vehicle id="block" type="car" depart="0" departLane="0" departPos="8" departSpeed="0" route="main">'
     blocked += '<stop lane="main_in_0" endPos="9" duration="1000"/></vehicle><flow id="joining"'
     late = '<vehicle id="late" type="host" depart="61" route="main"/></routes>'
@@ -315,8 +315,10 @@ def test_in_a_sumo_that_runs_already(minute):
         attached = json.loads(merge_cosim(*case, "--attach", address, cwd=folder).stdout)
     own = json.loads(merge_cosim(*case, cwd=folder).stdout)
     assert attached["meetings"] > 0
-    told = ("mean_speed", "time_loss_s")  # SUMO knows these only where it was asked for trips
-    assert {k: v for k, v in attached.items() if k not in told} == {k: v for k, v in own.items() if k not in told}
+    of_trips = ("mean_speed", "time_loss_s")  # SUMO knows these only where it was asked for trips
+    assert {k: v for k, v in attached.items() if k not in of_trips} == {
+        k: v for k, v in own.items() if k not in of_trips
+    }
 
 
 def test_settings_of_scenes(minute):

@@ -315,8 +315,8 @@ class Hesitant(Estimator):
     done = merge_cosim("sweep", scenario, *arguments, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert summary(tmp_path / "out")["hesitant"]["n"] == 75
-    told = merge_cosim("cases", "out", cwd=tmp_path).stdout
-    assert "--plugin own/mine.py" in told  # as it was given, so that the command can be pasted
+    listed = merge_cosim("cases", "out", cwd=tmp_path).stdout
+    assert "--plugin own/mine.py" in listed  # as it was given, so that the command can be pasted
 
 
 def test_a_plugin_that_breaks_is_named(tmp_path):

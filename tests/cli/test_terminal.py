@@ -58,11 +58,11 @@ def test_one_method_fits_and_has_nothing_to_be_best_of(swept):
 
 
 def test_the_verdicts_alone(swept):
-    folder, told = swept
+    folder, output = swept
     line = merge_cosim("summary", "every", "--verdict", cwd=folder).stdout.strip()
     title, _, verdict = line.partition("): ")
-    assert f"{title})" in told
-    assert verdict in " ".join(told.split())
+    assert f"{title})" in output
+    assert verdict in " ".join(output.split())
 
 
 def test_more_columns_and_chosen_ones(swept):
@@ -168,7 +168,7 @@ def test_a_finished_sweep_is_never_replaced_unasked(swept):
     assert (folder / "one/results.parquet").read_bytes() != before
 
 
-def test_a_case_is_told_in_five_lines(swept):
+def test_a_case_is_described_in_five_lines(swept):
     folder, _ = swept
     run = ("run", "small.toml", "--world", "closed-form", "--method", "acc", "--case")
     title, start, merge, result, cost = merge_cosim(*run, "d+0_h15_m15", cwd=folder).stdout.splitlines()

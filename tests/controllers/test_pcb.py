@@ -86,7 +86,7 @@ def test_drives_the_cheapest_in_expectation():
         assert command[0] == controller.candidates[expected.argmin()]
 
 
-def test_believes_what_it_is_told():
+def test_believes_the_given_log_odds():
     # level and as fast: it goes before one who yields and lets one pass who does not
     controller, now = ready(Pcb()), seen((-60, 12), (-60, 12))
     command = [controller.command(now, np.array([odds]), np.array([odds > 0]))[0] for odds in (-np.inf, np.inf)]

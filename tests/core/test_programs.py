@@ -81,7 +81,7 @@ def test_a_signal_ends_the_program_too(tmp_path: Path, number: int) -> None:
     assert_ended(tmp_path)
 
 
-def test_a_missing_system_library_is_told_with_its_package() -> None:
+def test_a_missing_system_library_is_reported_with_its_package() -> None:
     said = (
         "netconvert: error while loading shared libraries: libatomic.so.1: cannot open shared object file: No such file"
     )

@@ -54,7 +54,7 @@ def test_idm_keeps_its_distance_to_a_host_ahead():
     assert acceleration(driver, (-54.0, 8.0), (-60.0, 10.0)) == pytest.approx(-4.0)  # all that it brakes
 
 
-def test_idm_takes_any_host_in_front_as_its_leader_if_told_to():
+def test_idm_takes_any_host_in_front_as_its_leader_if_set_so():
     assert acceleration(idm(ahead="any"), (-57.0, 10.0), (-60.0, 10.0)) == pytest.approx(-4.0)
     assert acceleration(idm(ahead="in-lane"), (-57.0, 10.0), (-60.0, 10.0)) == pytest.approx(1.0 - 0.5**4)
 

@@ -17,7 +17,7 @@ def kind(path):
     return sources(path)[0].kind
 
 
-def test_files_are_told_by_content_not_by_name(tmp_path):
+def test_files_are_recognised_by_content_not_by_name(tmp_path):
     for source in (
         sources(write_text(tmp_path / "a.parquet", CAR))[0],
         sources(write_csv(tmp_path / "b.txt", CAR))[0],

@@ -111,11 +111,11 @@ def test_mistakes_in_the_recording_are_named(tmp_path: Path, own: Site) -> None:
 def test_there_is_no_surrogate_of_it(tmp_path: Path, own: Site) -> None:
     scenario = tmp_path / "own.toml"
     scenario.write_text((EXAMPLE / "mona-replay.toml").read_text().replace("ramps/mona-merge", "merge"))
-    told = refused("sweep", "own.toml", "--method", "acc", "--out", "out", cwd=tmp_path)
-    assert "site merge: there is no surrogate of it (only of us101 and i80); give its data with --data DIR" in told
+    line = refused("sweep", "own.toml", "--method", "acc", "--out", "out", cwd=tmp_path)
+    assert "site merge: there is no surrogate of it (only of us101 and i80); give its data with --data DIR" in line
     scenario.write_text(scenario.read_text().replace('sites = { "merge"', 'sites = { "nowhere"'))
-    told = refused("sweep", "own.toml", "--method", "acc", "--out", "out", cwd=tmp_path)
-    assert "unknown site 'nowhere': choose i80, us101, or a folder with site.toml" in told
+    line = refused("sweep", "own.toml", "--method", "acc", "--out", "out", cwd=tmp_path)
+    assert "unknown site 'nowhere': choose i80, us101, or a folder with site.toml" in line
 
 
 def test_full_scenes_find_the_site_of_a_ramp_by_its_folder(tmp_path: Path) -> None:

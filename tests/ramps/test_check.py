@@ -81,7 +81,7 @@ def change(file: Path, old: str, new: str) -> None:
         ),
     ],
 )
-def test_each_problem_of_the_sources_is_told(tmp_path: Path, kind: str, old: str, new: str, problem: str) -> None:
+def test_each_problem_of_the_sources_is_reported(tmp_path: Path, kind: str, old: str, new: str, problem: str) -> None:
     folder = new_ramp(tmp_path / "mine", LANE)
     change(folder / f"mine.{kind}.xml", old, new)
     assert check(folder) == [
@@ -93,12 +93,12 @@ def test_each_problem_of_the_sources_is_told(tmp_path: Path, kind: str, old: str
     assert all(line.startswith(str(folder)) and "\n" not in line for line in problems)
 
 
-def test_a_road_that_turns_back_is_told(tmp_path: Path) -> None:
+def test_a_road_that_turns_back_is_reported(tmp_path: Path) -> None:
     folder = new_ramp(tmp_path / "mine", RampNumbers())
     change(folder / "mine.edg.xml", 'shape="0.00,0.00 1500.00,0.00"', 'shape="0.00,0.00 -9.00,40.00 1500.00,0.00"')
     build(folder)
-    told = "main: stations would run backwards: 'main_out' turns back at the end of 'main_in'"
-    assert any(told in line for line in check(folder))
+    expected = "main: stations would run backwards: 'main_out' turns back at the end of 'main_in'"
+    assert any(expected in line for line in check(folder))
 
 
 @pytest.mark.parametrize(
@@ -118,17 +118,17 @@ def test_a_road_that_turns_back_is_told(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_each_problem_of_the_definition_is_told(tmp_path: Path, old: str, new: str, problem: str) -> None:
+def test_each_problem_of_the_definition_is_reported(tmp_path: Path, old: str, new: str, problem: str) -> None:
     problems = check(copy_with(tmp_path, old, new))
     assert any(problem in line for line in problems), problems
 
 
-def test_a_merging_point_beyond_a_gore_without_a_lane_is_told(tmp_path: Path) -> None:
+def test_a_merging_point_beyond_a_gore_without_a_lane_is_reported(tmp_path: Path) -> None:
     (problem,) = check(copy_with(tmp_path, "merging_point = 0.0", "merging_point = 20.0", "designed"))
     assert "merging_point: there is no auxiliary lane, so it must be 0.0" in problem
 
 
-def test_an_auxiliary_lane_whose_rest_is_not_listed_is_told(tmp_path: Path) -> None:
+def test_an_auxiliary_lane_whose_rest_is_not_listed_is_reported(tmp_path: Path) -> None:
     folder = new_ramp(tmp_path / "mine", LANE)
     change(folder / "ramp.toml", "host_lane = [0, 1, 0]", "host_lane = [0, 1, 1]")
     change(folder / "mine.con.xml", '<connection from="merge" fromLane="2" to="main_out" toLane="1"/>', UP)
@@ -143,9 +143,9 @@ def test_an_auxiliary_lane_whose_rest_is_not_listed_is_told(tmp_path: Path) -> N
 def test_notes_are_no_problems(tmp_path: Path) -> None:
     folder = new_ramp(tmp_path / "mine", RampNumbers(acceleration_lane=100.0))
     assert check(folder) == []
-    told = notes(folder)
-    assert any("80 m of auxiliary lane after it; braking comfortably (3.4 m/s^2)" in line for line in told)
-    assert any("no georeference" in line for line in told)
+    found = notes(folder)
+    assert any("80 m of auxiliary lane after it; braking comfortably (3.4 m/s^2)" in line for line in found)
+    assert any("no georeference" in line for line in found)
     (folder / "mine.netccfg").unlink()
     assert check(folder) == []
     assert any("neither edited nor rebuilt" in line for line in notes(folder))

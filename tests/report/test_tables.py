@@ -64,7 +64,7 @@ DEFICIENCIES = {
 
 
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)
-def test_families_are_told_apart_by_the_colour_blind(deficiency):
+def test_families_are_distinguished_by_the_colour_blind(deficiency):
     """Their colours differ by at least 15 in CIELAB; just noticeable is 2.3."""
     encoded = np.array([rgba(color)[:3] for color in FAMILY_COLORS.values()]) / 255
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)

@@ -29,7 +29,7 @@ def laid(host, merging, length=5.0, odds=None, speeds=None):
 
 
 def watched(tracks, rules):
-    """The cycle in which an encounter is over, as the loop is told; None if it goes on."""
+    """The cycle in which an encounter is over, as the loop finds it; None if it goes on."""
     watch, states = Watch(1, rules), tracks.states
     watch.reset(np.array([0]), np.array([NEVER]))
     for k in range(1, len(states.host_station)):

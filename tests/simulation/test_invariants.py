@@ -57,7 +57,7 @@ def test_a_controller_that_leaves_its_bounds(commanded, expected):
 
 
 def meddled(meddle, at=30) -> Run:
-    """A run on US-101's tiles in which SUMO is told something else once."""
+    """A run on US-101's tiles in which SUMO gets another command once."""
     world = TiledWorld(Ramp.load("us101"), COUNT)
     step, cycles = world.session.step, iter(range(10_000))
 
@@ -141,7 +141,7 @@ class Hard(Acc):
 """
 
 
-def test_a_broken_invariant_is_counted_and_told(tmp_path):
+def test_a_broken_invariant_is_counted_and_reported(tmp_path):
     (tmp_path / "hard.py").write_text(PLUGIN)
     (tmp_path / "small.toml").write_text(SMALL)
     words = ("sweep", "small.toml", "--plugin", "hard.py", "--world", "closed-form", "--out", "out", "--method")

@@ -22,7 +22,7 @@ def test_an_address_is_host_and_port(text):
     assert Address.parse("here:8813") == Address("here", 8813)
 
 
-def test_the_end_of_sumo_in_mid_run_is_told():
+def test_the_end_of_sumo_in_mid_run_is_reported():
     ramp = Ramp.load("designed")
     with socket.socket() as free:
         free.bind(("localhost", 0))

@@ -51,7 +51,7 @@ def test_a_sweep_of_objects(tmp_path: Path) -> None:
     assert "class LeadRule(Estimator)" in manifest["components"]["lead-rule"]
 
 
-def test_what_cannot_be_told_apart_or_reached_is_refused() -> None:
+def test_what_cannot_be_distinguished_or_reached_is_refused() -> None:
     with pytest.raises(UserError, match="two methods are called 'lead-rule'"):
         plan(request(LeadRule(lead=5.0), LeadRule(lead=6.0)))
     assert len(plan(request(LeadRule, LeadRule(lead=10.0)))) == 1

@@ -1,4 +1,4 @@
-"""What is told before a long sweep."""
+"""What is printed before a long sweep."""
 
 import re
 
@@ -11,14 +11,14 @@ from merge_cosim.sweeps.plan import SweepRequest, plan
 
 def test_a_sweep_of_all_methods_in_three_traffic_scenarios_is_announced():
     tasks = plan(SweepRequest(["traffic-light", "traffic-dense", "traffic-stop-and-go"]))
-    told = forecast(tasks, jobs=2)
-    scenes, methods = (int(n) for n in re.match(r"(\d+) scenes to run: 3 scenarios, (\d+) methods", told).groups())
+    text = forecast(tasks, jobs=2)
+    scenes, methods = (int(n) for n in re.match(r"(\d+) scenes to run: 3 scenarios, (\d+) methods", text).groups())
     assert scenes == 3 * 8 * methods
-    assert told.endswith("with 2 processes")
+    assert text.endswith("with 2 processes")
     assert 10 * 60 < seconds(tasks, jobs=2) < 2 * 3600
 
 
-def test_a_short_sweep_has_its_cases_told_and_no_time():
+def test_a_short_sweep_has_its_cases_printed_and_no_time():
     tasks = plan(SweepRequest(["designed-2"], ["acc"]))
     assert forecast(tasks, jobs=1) == "6,875 cases to run: 1 scenario, 1 method"
     assert seconds(tasks, jobs=1) < 30

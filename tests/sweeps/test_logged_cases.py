@@ -135,7 +135,7 @@ def test_logged_cars_drive_through_a_host_that_stops_unless_they_are_released() 
     assert (facts["driven_through"], facts["released"]) == (0, 3)
 
 
-def test_a_released_car_that_the_merging_car_drives_into_is_told() -> None:
+def test_a_released_car_that_the_merging_car_drives_into_is_reported() -> None:
     x = -5.0 + np.cumsum(np.where(np.arange(120) < 10, 7.0, 25.0)) * 0.1
     slow = Car(31, [6 if at < 205 else 8 for at in x], x)  # in its log it makes way
     how = {"others": "released", "drivers.accel": 0.1}
@@ -216,7 +216,7 @@ def test_what_makes_no_full_scene_is_refused(name: str, settings: dict[str, Any]
     assert message in str(refused.value)
 
 
-def test_a_pair_without_a_scene_is_told() -> None:
+def test_a_pair_without_a_scene_is_reported() -> None:
     batch, _ = batches(HOST, MERGING)
     with pytest.raises(UserError, match="no scene holds the pair"):
         LoggedCases.of(batch.cases.encounters, FullScene(), {})

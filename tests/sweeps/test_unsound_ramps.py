@@ -1,4 +1,4 @@
-"""Sweeps and runs refuse a ramp that does not pass `ramp check`, unless told."""
+"""Sweeps and runs refuse a ramp that does not pass `ramp check`, unless that is asked for."""
 
 import shutil
 

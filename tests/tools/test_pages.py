@@ -173,7 +173,7 @@ def test_surrogate(tmp_path, data_dir):
     surrogate_page.main(["--short", "--docs", str(tmp_path), "--data", str(data_dir)])
     text = made_like(tmp_path, "surrogate.md")
     assert "4 minutes of traffic per site, in 1 recordings" in text
-    assert len(re.findall(r"^\| real \|", text, flags=re.MULTILINE)) == 2  # the pairs, and how well the order is told
+    assert len(re.findall(r"^\| real \|", text, flags=re.MULTILINE)) == 2  # the pairs, and how well the order is found
 
 
 def test_scenes(tmp_path, data_dir):

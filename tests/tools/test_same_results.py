@@ -42,10 +42,10 @@ def test_order_times_version_and_new_columns_are_no_difference(a, tmp_path, caps
     rows = {name: values[::-1] for name, values in ROWS.items()} | {"stuck": [False] * 4}
     b = folder(tmp_path / "b", rows, SUMMARY | {"cycle_us": [9.0, 9.0]}, version="4")
     assert same_results.main([a, b]) == 0
-    told = capsys.readouterr().out
-    assert "results.parquet: 4 and 4 rows, 4 in both; the same" in told
-    assert "summary.csv: 2 and 2 rows, 2 in both; the same" in told
-    assert "columns in B alone: stuck" in told
+    output = capsys.readouterr().out
+    assert "results.parquet: 4 and 4 rows, 4 in both; the same" in output
+    assert "summary.csv: 2 and 2 rows, 2 in both; the same" in output
+    assert "columns in B alone: stuck" in output
 
 
 @pytest.mark.parametrize(

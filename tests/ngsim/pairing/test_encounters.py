@@ -89,7 +89,7 @@ def test_a_surrogate_is_called_one(tmp_path: Path) -> None:
     assert e.source.tolist() == ["surrogate"]
 
 
-def test_the_surrogate_is_told_from_real_recordings_by_its_file(tmp_path: Path) -> None:
+def test_the_surrogate_is_distinguished_from_real_recordings_by_its_file(tmp_path: Path) -> None:
     pq.write_table(table(*merge_at(30, "a"), *merge_at(40, "surrogate_1")), tmp_path / "both.parquet")
     e = site_encounters(tmp_path, US101)
     assert e is not None

@@ -114,7 +114,7 @@ def test_a_run_is_recorded_from_the_warm_up_on(tmp_path: Path) -> None:
     assert sorted(set(run["timestep_time"].to_pylist())) == pytest.approx(20.0 + 0.1 * np.arange(20))
 
 
-def test_sumo_that_fails_is_told_in_one_line(tmp_path: Path) -> None:
+def test_sumo_that_fails_is_reported_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="SUMO fails") as error:
         generate(replace(SHORT["us101"], min_gap=-5.0), Ramp.load("us101"), tmp_path / "x.parquet")
     assert "\n" not in str(error.value)

@@ -45,11 +45,11 @@ def test_a_real_interchange_is_described_and_not_touched(tmp_path: Path) -> None
 def test_what_encounters_need_is_a_note_only(tmp_path: Path) -> None:
     net = copied(GAMES / "ramp" / "ramp.net.xml", tmp_path)
     done = merge_cosim("ramp", "describe", net.name, "--json", cwd=tmp_path)
-    told = json.loads(done.stdout)
-    assert told["problems"] == []
-    assert any("219 m upstream of the gore" in note for note in told["notes"])
-    assert told["found"][0] == "main road: gneE2 offramp gneE3 gneE7 gneE8 gneE11, host's lanes 1 1 0 1 0 0"
-    assert not any("netccfg" in note for note in told["notes"])
+    found = json.loads(done.stdout)
+    assert found["problems"] == []
+    assert any("219 m upstream of the gore" in note for note in found["notes"])
+    assert found["found"][0] == "main road: gneE2 offramp gneE3 gneE7 gneE8 gneE11, host's lanes 1 1 0 1 0 0"
+    assert not any("netccfg" in note for note in found["notes"])
     checked = merge_cosim("ramp", "check", ".", cwd=tmp_path)
     assert checked.returncode == 0
     assert "no problem found" in checked.stdout

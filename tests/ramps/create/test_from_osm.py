@@ -45,7 +45,7 @@ def test_an_acceleration_lane_as_mappers_draw_it(tmp_path: Path) -> None:
     assert 111_320 * math.hypot(east, float(nodes["104"].y) - 48.2) < 8.0
 
 
-def test_an_acceleration_lane_that_is_guessed_is_told(tmp_path: Path) -> None:
+def test_an_acceleration_lane_that_is_guessed_is_reported(tmp_path: Path) -> None:
     text = TEXT.replace('k="lanes" v="3"', 'k="lanes" v="2"').replace(
         '"ref" v="A 97"', '"name" v="King\'s &amp; Queen\'s"'
     )

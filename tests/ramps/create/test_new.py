@@ -42,7 +42,7 @@ def test_what_comes_out_has_the_numbers(
     assert sumolib.net.readNet(str(tile_net(ramp, 2))).hasEdge("t1.main_out")
 
 
-def test_an_acceleration_lane_too_short_to_brake_in_is_told(tmp_path: Path) -> None:
+def test_an_acceleration_lane_too_short_to_brake_in_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="50 m of auxiliary lane after it, but 53 m to brake in"):
         new_ramp(tmp_path / "mine", RampNumbers(acceleration_lane=50.0))
     assert not (tmp_path / "mine").exists()
@@ -58,6 +58,6 @@ def test_an_acceleration_lane_too_short_to_brake_in_is_told(tmp_path: Path) -> N
         (RampNumbers(acceleration_lane=1500.0), "make --downstream longer"),
     ],
 )
-def test_numbers_that_make_no_ramp_are_told(tmp_path: Path, numbers: RampNumbers, message: str) -> None:
+def test_numbers_that_make_no_ramp_are_reported(tmp_path: Path, numbers: RampNumbers, message: str) -> None:
     with pytest.raises(UserError, match=message):
         new_ramp(tmp_path / "mine", numbers)

@@ -23,7 +23,7 @@ def test_the_nearest_cars_ahead_and_behind_are_found() -> None:
     assert seen.through == []
 
 
-def test_a_car_that_drives_through_the_host_is_told_once_and_heeded_no_more() -> None:
+def test_a_car_that_drives_through_the_host_is_reported_once_and_then_ignored() -> None:
     seen = Neighbours(5.0, sight=50.0)
     assert look(seen, ("leader", 120), ("follower", 94.5))[2] == 0.5
     assert look(seen, ("leader", 120), ("follower", 95.5)) == ("leader", 16.0, -0.5)
