@@ -31,11 +31,11 @@ CORE = {
     ),
     "readers": (
         ["ngsim/clean.py", "ngsim/formats.py", "ngsim/table.py", "ngsim/rows.py", "ngsim/resample.py"],
-        [f"ngsim/test_{name}.py" for name in ("cells", "formats", "read", "resample", "table")],
+        [f"ngsim/test_{name}.py" for name in ("cells", "formats", "read", "resample", "table", "own_recording")],
     ),
     "loop": (
         ["simulation/loop.py", "simulation/leader.py", "simulation/host_driver.py"],
-        [f"simulation/test_{name}.py" for name in ("loop", "leader", "host_driver")],
+        [f"simulation/test_{name}.py" for name in ("leader", "host_driver", "loop")],
     ),
 }
 """Modules of each part, and the tests that must kill their mutants."""

@@ -102,6 +102,23 @@ def test_a_text_of_another_place_has_no_known_site(tmp_path):
     assert read_file(write_text(tmp_path / "b.txt", car(1, range(2), location="i-80"))).tables.keys() == {"i80"}
 
 
+@pytest.mark.parametrize(
+    ("column", "inside", "outside"),
+    [
+        ("Global_X", 6_450_700, 6_450_699),
+        ("Global_X", 6_453_200, 6_453_201),
+        ("Global_Y", 1_871_450, 1_871_449),
+        ("Global_Y", 1_873_750, 1_873_751),
+    ],
+)
+def test_a_study_area_ends_at_each_of_its_sides(tmp_path, column, inside, outside):
+    def at(place):
+        return read_file(write_text(tmp_path / "a.txt", [row | {column: place} for row in ROWS]))
+
+    assert at(inside).tables.keys() == {"us101"}
+    assert at(outside).elsewhere == {"outside all study areas": len(ROWS)}
+
+
 def test_the_site_can_be_given_where_the_file_does_not_tell_it(tmp_path):
     columns = [name for name in HEADER if not name.startswith("Global_") or name == "Global_Time"]
     path = write_csv(tmp_path / "a.csv", ROWS, columns)
@@ -129,6 +146,7 @@ def test_missing_lengths_are_nan(tmp_path):
         ("Local_X", "inf", "Local_X is 'inf', not a number"),
         ("Frame_ID", "1.5", "Frame_ID is '1.5', not a whole number"),
         ("Local_Y", "99999", "Local_Y is '99999', impossible: outside -328.084 to 3280.84"),
+        ("Local_X", "-164.1", "Local_X is '-164.1', impossible: outside -164.042 to 328.084"),
         ("Lane_ID", "-1", "Lane_ID is '-1', impossible: outside 0 to 20"),
         ("Global_Time", "never", "Global_Time is 'never', not a number"),
     ],

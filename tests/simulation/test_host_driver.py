@@ -73,11 +73,14 @@ class Counting(Estimator):
     """Returns how many cycles a slot has seen since its reset, and keeps the streams that it was given."""
 
     def start(self, count, setting):
-        self.age, self.keys = np.zeros(count), []
+        self.age, self.keys, self.resting = np.zeros(count), [], []
 
     def reset(self, rows, labels, keys):
         self.age[rows] = 0
         self.keys += keys.tolist()
+
+    def rest(self, rows):
+        self.resting += rows.tolist()
 
     def update(self, seen):
         self.age += 1
@@ -98,6 +101,14 @@ def test_blocks_are_added_while_others_go_on():
     idle, _ = blocks.decide(four, np.array([False, False, True, False]))
     assert idle.tolist() == [0.0, 0.0, 2.0, 2.0]  # the first block was left out
     assert blocks.decide(four, np.array([True, False, False, False]))[0].tolist()[:2] == [3.0, 2.0]
+
+
+def test_rows_that_rest_are_those_of_their_block():
+    driver = HostDriver(Counting(), Acc())
+    blocks = DriverBlocks(driver, 3, Setting())
+    blocks.make_room(7)
+    blocks.rest(np.array([0, 2, 4, 6, 8]))
+    assert [one.estimator.resting for one in blocks._blocks] == [[0, 2], [1], [0, 2]]
 
 
 def test_what_is_decided_comes_from_what_is_observed():

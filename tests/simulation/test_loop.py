@@ -105,6 +105,9 @@ def test_a_case_alone_ends_as_in_its_batch_and_can_be_traced():
     alone = on_sumo("designed", 1, encounters.take(np.array([5])), "acc", traced={"r5"})
     for name, column in batch.columns.items():
         np.testing.assert_array_equal(column[5:6], alone.columns[name], err_msg=name)
+    for run in (batch, alone):
+        cycles = run.columns["end_cycle"].sum()
+        assert (run.effort.encounter_cycles, run.effort.vehicle_steps) == (cycles, 2 * cycles)
     trace = alone.traces["r5"]
     assert batch.traces["r5"].equals(trace)
     assert len(trace["time_s"]) == alone.columns["end_cycle"][0]
