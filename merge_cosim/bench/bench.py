@@ -78,8 +78,7 @@ commanding included; `cars` is the mean over the run.
 SCALING = """## Whole sweeps by cases and processes
 
 `designed-random` under `acc`. `run_s` is the time with all processes at work, their start included; `loop_ms_per_case`
-is the time in the loops, summed over processes; `peak_mib` is the largest process, but never less than the bench's
-own memory.
+is the time in the loops, summed over processes; `peak_mib` is the peak memory of the largest process.
 """
 OTHER = """## Another version
 

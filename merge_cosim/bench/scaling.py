@@ -20,6 +20,15 @@ METHODS = ("acc", "slot", "pgm", "pgm-g", "fg", "fg-gmm", "ipcb", "dbn-pf")
 COUNTS = (1, 2, 4, 8)
 """Of `METHODS`, growth over methods takes the first, the first two, and so on."""
 START = "from merge_cosim.cli.main import main; main()"
+MEASURE = """
+import json, os, subprocess, sys
+_, status, used = os.wait4(subprocess.Popen(sys.argv[2:]).pid, 0)
+with open(sys.argv[1], "w") as file:
+    json.dump([used.ru_utime + used.ru_stime, used.ru_maxrss], file)
+sys.exit(os.waitstatus_to_exitcode(status) and 1)
+"""
+"""Runs a command and writes what it and its workers used. From a small process, as the peak memory that Linux counts
+for a new process is never below that of the one that started it."""
 
 
 def scaling(sizes: Sequence[int], processes: Sequence[int], rounds: int) -> list[dict[str, Any]]:
@@ -105,15 +114,17 @@ def run_sweep(
     """
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
+        cost = Path(folder) / "cost.json"
         command = [sys.executable, "-c", START, *words, "--out", str(out)]
         with (Path(folder) / "log").open("w+") as log:
             environment = {**os.environ, **(variables or {})}
-            process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=environment)
-            _, status, used = os.wait4(process.pid, 0)  # with its workers
-            process.returncode = os.waitstatus_to_exitcode(status)
-            if process.returncode:
+            measured = [sys.executable, "-I", "-S", "-c", MEASURE, str(cost), *command]
+            if subprocess.run(measured, stdout=log, stderr=log, cwd=folder, env=environment, check=False).returncode:
                 log.seek(0)
                 raise UserError(f"bench: merge-cosim {' '.join(words)} failed: {log.read().strip().splitlines()[-1]}")
         manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
-    peak = round(used.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10))
-    return manifest, {"cpu_s": round(used.ru_utime + used.ru_stime, 2), "peak_mib": peak}
+        cpu_s, peak = json.loads(cost.read_text())
+    return manifest, {
+        "cpu_s": round(cpu_s, 2),
+        "peak_mib": round(peak / (2**20 if sys.platform == "darwin" else 2**10)),
+    }
