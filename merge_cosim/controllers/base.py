@@ -32,7 +32,7 @@ class Controller(Component):
         return {}
 
     def pair(self, estimator: Estimator) -> None:
-        """Take note of the estimator that drives along, before `start`: for more of it than its log-odds."""
+        """Called with the method's estimator before `start`, for controllers that use more of it than its log-odds."""
 
     def start(self, count: int, setting: Setting) -> None:
         """Make room for a batch of `count` encounters and forget everything before."""

@@ -31,7 +31,7 @@ class Estimator(Component):
     needs_label: ClassVar[bool] = False
 
     def use(self, model: IntentionModel) -> None:
-        """Take what was learned from data."""
+        """Set the model that was learned from data."""
 
     def start(self, count: int, setting: Setting) -> None:
         """Make room for a batch of `count` encounters and forget everything before."""
@@ -42,12 +42,12 @@ class Estimator(Component):
 
         Args:
             rows: Where they begin, shape (m,).
-            labels: What the log or the script says they are (`Intention`); for references only. Shape (m,).
+            labels: Their intentions by the log or the script (`Intention`); for references only. Shape (m,).
             keys: Key of each one's random stream (`merge_cosim.core.random_streams`), shape (m,).
         """
 
     def rest(self, rows: IntArray) -> None:
-        """The encounters at `rows` are over: until `reset`, what `update` gives for them means nothing; shape (m,)."""
+        """The encounters at `rows`, shape (m,), are over: until `reset`, their values of `update` are arbitrary."""
 
     @abstractmethod
     def update(self, seen: Observation) -> FloatArray:
@@ -66,5 +66,5 @@ def estimator(cls: type[E]) -> type[E]:
 
 
 def certain(not_yield: BoolArray) -> FloatArray:
-    """Log-odds of a rule without doubt: +inf where NOT_YIELD, -inf where YIELD."""
+    """Log-odds of a rule without probabilities: +inf where NOT_YIELD, -inf where YIELD."""
     return np.where(not_yield, np.inf, -np.inf)

@@ -1,4 +1,4 @@
-"""References that bound what an estimator can do: constant decisions, and knowing the label."""
+"""References that bound what an estimator can do: constant decisions, and one that reads the label."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -50,7 +50,7 @@ class AlwaysBrake(AlwaysYield):
 @estimators.register
 @dataclass(kw_only=True)
 class OracleLabel(Estimator):
-    """Knows the label. Not a bound: the host's own driving may change the order.
+    """Reads the label. Not a bound: the host's own driving may change the order.
 
     Where a case has no label (a scripted driver that ignores the host) the car that arrives first goes first, as in
     `slot-time`.
@@ -66,7 +66,7 @@ class OracleLabel(Estimator):
         self._labels = np.full(count, int(Intention.YIELD))
 
     def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
-        """Learn the labels of the new encounters."""
+        """Set the labels of the new encounters."""
         self._labels[rows] = labels
 
     def update(self, seen: Observation) -> FloatArray:

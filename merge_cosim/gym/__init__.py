@@ -12,7 +12,7 @@ from merge_cosim.controllers.policy import save_policy
 from merge_cosim.gym.settings import Options, Reward
 
 NAME = "merge_cosim/Merge-v0"
-"""What `gymnasium.make` and `gymnasium.make_vec` know the environment by."""
+"""Name of the environment for `gymnasium.make` and `gymnasium.make_vec`."""
 
 gymnasium.register(
     NAME,

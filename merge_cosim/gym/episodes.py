@@ -27,7 +27,7 @@ from merge_cosim.sweeps.cases import PairCases
 
 
 class Driven(HostDriver):
-    """Hosts that do what was last said in `action`, shape (n,)."""
+    """Hosts whose accelerations are those in `action`, shape (n,)."""
 
     action: FloatArray
 
@@ -74,7 +74,7 @@ class Episodes(Loop):
     Attributes:
         task: Scenario, encounters and setting.
         host: The path that the host comes by.
-        over: What the last step ended; None if nothing.
+        over: The encounters that ended in the last step; None without any.
     """
 
     over: Over | None = None

@@ -21,7 +21,7 @@ from merge_cosim.sweeps.task import Task
 ActionKind: TypeAlias = Literal["acceleration", "decision"]
 """The host's acceleration [m/s^2], or 0 to go and 1 to yield, which the controller `acc` then drives."""
 AGENT = "agent"
-"""What rows call the method, which is outside."""
+"""Name of the agent in the column `method`."""
 
 
 @dataclass(frozen=True)

@@ -63,8 +63,8 @@ def netconvert(file: Path, *options: str) -> None:
     command = [sumolib.checkBinary("netconvert"), *options]
     done = run_program(command, LIMIT, file)
     if done.returncode:
-        said = done.stderr.decode(errors="replace").splitlines()
-        lines = [line for line in said if line.startswith("Error")] or said
+        output = done.stderr.decode(errors="replace").splitlines()
+        lines = [line for line in output if line.startswith("Error")] or output
         raise UserError(f"{file}: netconvert refuses it: {lines[0] if lines else 'no reason given'}")
 
 

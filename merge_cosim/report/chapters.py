@@ -79,7 +79,7 @@ def chapter(
     results: pd.DataFrame,
     summary: pd.DataFrame,
     manifest: dict[str, Any],
-    said: Verdict,
+    verdict: Verdict,
     recorded: Sequence[dict[str, Any]],
 ) -> Chapter:
     """Make the chapter of a section.
@@ -90,7 +90,7 @@ def chapter(
         results: All result rows.
         summary: All summary rows.
         manifest: The sweep's manifest.
-        said: The verdict of this section.
+        verdict: The verdict of this section.
         recorded: All recorded cases.
     """
     rows = section.of(results)
@@ -105,7 +105,7 @@ def chapter(
     if beliefs is not None:
         found["belief"] = beliefs
     own = set(rows["case"])
-    outcome = page_data.outcome_rows(tables.of_section(summary, section), rows, said)
+    outcome = page_data.outcome_rows(tables.of_section(summary, section), rows, verdict)
     data = {
         "rows": outcome,
         "map": page_data.map_data(rows) if kind in MAPPED else None,
@@ -119,7 +119,7 @@ def chapter(
         title=_title(scenario["title"], section.site, section.source),
         source=SOURCES.get(section.source, section.source),
         about=" ".join(scenario["about"].split()),
-        verdict=said,
+        verdict=verdict,
         rows=outcome,
         notes=_notes(section, rows, scenario, manifest),
         tables=found,

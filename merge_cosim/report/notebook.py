@@ -46,7 +46,7 @@ def pairs_html(pairs: Sequence[tuple[str, str]]) -> str:
     """A table with a name and a text per row."""
     left = 'style="text-align:left"'
     rows = "".join(
-        f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(said)}</td></tr>" for name, said in pairs
+        f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(text)}</td></tr>" for name, text in pairs
     )
     return f"<table>{rows}</table>"
 

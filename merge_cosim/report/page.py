@@ -89,9 +89,9 @@ def read_report(folder: Path, against: str | None = None) -> Report:
     shown, left_out = fitting(store.traces.recorded())
     traces = store.traces.read(shown).to_pandas()
     recorded = recorded_cases(traces, results)
-    said = verdicts(summary, results)
+    found = verdicts(summary, results)
     chapters = [
-        chapter(i, one, results, summary, manifest, said[one.scenario, one.site, one.source], recorded)
+        chapter(i, one, results, summary, manifest, found[one.scenario, one.site, one.source], recorded)
         for i, one in enumerate(tables.sections(summary), 1)
     ]
     variations = {

@@ -31,7 +31,7 @@ def method_looks(looks: Mapping[str, Look]) -> dict[str, Any]:
     }
 
 
-def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, said: Verdict) -> list[dict[str, Any]]:
+def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, verdict: Verdict) -> list[dict[str, Any]]:
     """One entry per method, the best first and references last: the numbers of the chart and of the short table.
 
     Of a method with several models the median, and the range in place of the intervals.
@@ -39,7 +39,7 @@ def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, said: Verdict) -> li
     Args:
         summary: Summary rows of one section.
         rows: Its result rows.
-        said: Its verdict.
+        verdict: Its verdict.
     """
     found = []
     for method in in_order(map(str, summary["method"])):
@@ -56,8 +56,8 @@ def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, said: Verdict) -> li
             {
                 "method": method,
                 "reference": is_reference(method),
-                "best": method in said.best and len(said.best) < len(said.order),
-                "undecided": method in said.undecided and method not in said.best,
+                "best": method in verdict.best and len(verdict.best) < len(verdict.order),
+                "undecided": method in verdict.undecided and method not in verdict.best,
                 "models": len(own),
                 "n": int(own["n"].iloc[0]),
                 "failed": round(middle["failures"]),
@@ -74,7 +74,7 @@ def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, said: Verdict) -> li
                 "distance": number(middle["distance_m"], 6),
             }
         )
-    order = {method: place for place, method in enumerate(said.order)}
+    order = {method: place for place, method in enumerate(verdict.order)}
     return sorted(
         found,
         key=lambda one: (

@@ -129,8 +129,8 @@ def short_tables(path: Path, wide: bool = False, columns: Sequence[str] = ()) ->
         sentence = judged[scenario, site, source].sentence if (scenario, site, source) in judged else ""
         varied = bool(part["variation"].notna().any())
         about.append(f"world {manifest['world']}")
-        said = f"Without variation: {sentence}" if varied else sentence
-        tables.append(_table(scenario, about, part, shown, said, columns))
+        verdict = f"Without variation: {sentence}" if varied else sentence
+        tables.append(_table(scenario, about, part, shown, verdict, columns))
     return tables
 
 
@@ -176,18 +176,20 @@ def _beside(row: Mapping[Hashable, Any], columns: Sequence[Column]) -> ShortTabl
     cells.insert(1, ["failed under this one only", text["only_a"], text["only_b"], "", ""])
     only_a, only_b = (int(row[f"only_{side}"]) for side in "ab")
     if only_a == only_b:
-        said = "Both fail in as many cases" + ("; in the same ones." if not only_a else f"; {only_a:,} in each alone.")
+        verdict = "Both fail in as many cases" + (
+            "; in the same ones." if not only_a else f"; {only_a:,} in each alone."
+        )
     else:
         (few, less), (many, more) = sorted(((only_a, "A"), (only_b, "B")))
         cases = f"{many:,} case{'s' * (many > 1)}"
-        said = f"{less} fails less: {cases} under {more} alone, {few or 'none'} under {less} alone."
+        verdict = f"{less} fails less: {cases} under {more} alone, {few or 'none'} under {less} alone."
     if "p" in text:
         test = f"Exact test, a car's cases kept together: p = {text['p']}.".replace("= <", "< ")
-        said = f"{said} {test}"
+        verdict = f"{verdict} {test}"
     used = [place for place in range(len(sides)) if any(cells_of[place] for cells_of in cells)]
     shown = [[line[place] for place in used] for line in cells]
     title = f"{', '.join(names)}: {text['n']} common cases"
-    return ShortTable(title, tuple(sides[place] for place in used), shown, len(cells), frozenset(), said)
+    return ShortTable(title, tuple(sides[place] for place in used), shown, len(cells), frozenset(), verdict)
 
 
 def _several_models(summary: pd.DataFrame) -> pd.Series:
@@ -211,7 +213,7 @@ def _table(
     about: list[str],
     rows: pd.DataFrame,
     shown: Sequence[Column],
-    said: str = "",
+    verdict: str = "",
     kept: Sequence[str] = (),
 ) -> ShortTable:
     columns = []
@@ -237,7 +239,7 @@ def _table(
     }
     shown_rows = rows[[column.name for column in columns]].itertuples(index=False, name=None)
     cells = [[column.text(value) for column, value in zip(columns, row, strict=True)] for row in shown_rows]
-    return ShortTable(f"{scenario} ({', '.join(about)})", tuple(columns), cells, methods, frozenset(best), said)
+    return ShortTable(f"{scenario} ({', '.join(about)})", tuple(columns), cells, methods, frozenset(best), verdict)
 
 
 def _smallest(values: FloatArray) -> IntArray:

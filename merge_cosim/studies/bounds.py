@@ -2,10 +2,10 @@
 
 Against a log: full braking keeps the smallest station in every cycle, full throttle up to the limit the largest; if
 both fail, no host passes behind or ahead. It is decided by the loop and its scoring themselves, in the closed form.
-Smallest delay: ahead of the merging car nothing is sooner than full throttle; behind it see `minimum_delay`. A delay is
+Smallest delay: ahead of the merging car full throttle is the fastest; behind it see `minimum_delay`. A delay is
 rounded up to the next whole cycle where the host passes behind.
 
-Against a driver who reacts, only what is found is known to be possible (`clairvoyant`), and full throttle bounds the
+Against a driver who reacts, only the paths found are known to be possible (`clairvoyant`), and full throttle bounds the
 delay from below. The same search against a log shows how much it misses.
 """
 
@@ -109,7 +109,7 @@ def bounds(scenario: Scenario, encounters: Encounters, search: Search | None = F
 
     Returns:
         One row per case: `scenario`, `site`, `source`, `case`; `by_throttle`, `by_braking`, and `feasible`, that one of
-        them or the path found does not fail; `min_delay_s`, below which no host comes, NaN where no host passes;
+        them or the path found does not fail; `min_delay_s`, a lower bound of any delay, NaN where no host passes;
         `found_delay_s`, that of the path found, NaN without one; `infeasible_in_time`, that the smallest delay is above
         `MOST_DELAY`: against a log `min_delay_s`, against a driver who reacts `found_delay_s`.
 

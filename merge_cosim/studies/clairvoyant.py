@@ -2,9 +2,9 @@
 
 The drivers react, so every path is driven against the model of the merging car itself, cycle by cycle, with the case's
 own script and noise. A plan holds one acceleration of `Search.levels` for `Search.hold` cycles. From one hold to the
-next each case keeps `Search.beam` states: those that could still arrive first, and a spread of all others. What is
-found can be driven, so its delay is never too small; how far it may be too large is known from full throttle, sooner
-than which no host can be.
+next each case keeps `Search.beam` states: those that could still arrive first, and a spread of all others. Plans
+that are found can be driven, so their delay is never too small; full throttle, which no host can beat, bounds how far
+it may be too large.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ALIKE = 0.5
 
 @dataclass(frozen=True)
 class Search:
-    """How finely plans are searched.
+    """Resolution of the search for plans.
 
     Attributes:
         levels: Accelerations [m/s^2], rising; the last is full throttle.

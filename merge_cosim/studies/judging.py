@@ -86,9 +86,9 @@ def judge(model: IntentionModel, held_out: Encounters) -> dict[str, list[dict[st
     Frames of one pair are not independent of each other.
 
     Returns:
-        `scores`: accuracy, log loss, AUC and Brier score of each estimator and band; of a rule without doubt accuracy
-        only, and the AUC of `T_h - T_m`. `calibration`: how often drivers of each band did not yield, by what the
-        estimator gave for it.
+        `scores`: accuracy, log loss, AUC and Brier score of each estimator and band; of a rule without
+        probabilities only accuracy, and the AUC of `T_h - T_m`. `calibration`: share of the drivers of each band that
+        did not yield, by bins of the estimator's probability.
     """
     scored, calibrated = [], []
     for name in JUDGED:
@@ -116,7 +116,7 @@ def score(watched: Watched) -> dict[str, Any]:
 
 
 def calibration(watched: Watched) -> list[dict[str, Any]]:
-    """Mean P(NOT_YIELD) and share that did not yield, by bins of the former; none for a rule without doubt."""
+    """Mean P(NOT_YIELD) and share that did not yield, by bins of the former; none for a rule without probabilities."""
     if not np.isfinite(watched.log_odds).all():
         return []
     return [

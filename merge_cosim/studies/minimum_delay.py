@@ -2,7 +2,7 @@
 
 The host must stay below station 0 until it arrives, and from then on, for the scored horizon, behind the merging car's
 rear bumper. For a given cycle of arrival these conditions are convex in the accelerations, so that at each cycle and
-speed the reachable stations are an interval, and its two ends are all that has to be carried along. Within the horizon
+speed the reachable stations are an interval, of which only the two ends are kept. Within the horizon
 a station counts only if full braking from it stays behind to the horizon's end. Speeds lie on a grid, with
 accelerations that lead from one of its points to another: every path found can be driven, and none is found too soon.
 """
@@ -23,7 +23,7 @@ SPEED_STEP = 0.05
 
 @dataclass(frozen=True)
 class Ahead:
-    """A logged merging car as the host behind it sees it.
+    """A logged merging car, for a host behind it.
 
     Attributes:
         rear: Station of its rear bumper in each cycle [m]; inf once scoring is over.
@@ -53,7 +53,7 @@ class Ahead:
 
 @dataclass(frozen=True)
 class Reach:
-    """What a host can do.
+    """Bounds of a host's driving.
 
     Attributes:
         speed_limit: It never accelerates beyond this [m/s].

@@ -45,16 +45,16 @@ class LibsumoSession(Session):
             raise
         errors = (libsumo.TraCIException, libsumo.FatalTraCIError)
         words = ["--remote-port", "0"]  # with another port in the configuration SUMO would wait there
-        with _said() as said:
+        with _stderr_held_back() as written:
             try:
                 libsumo.start(["sumo", *options.arguments(), *words])
             except errors as error:
                 # SUMO prints the reason of some mistakes on standard error only.
                 reason = one_line(error)
-                lines = said().splitlines() if reason == _NO_REASON else []
+                lines = written().splitlines() if reason == _NO_REASON else []
                 reasons = [line.removeprefix("Error: ") for line in lines if line.startswith("Error: ")]
                 raise UserError(f"{options.file}: SUMO cannot start: {' '.join(reasons) or reason}") from None
-            output = said()
+            output = written()
         sys.stderr.write(output)
         super().__init__(libsumo, errors)
 
@@ -150,19 +150,19 @@ def one_line(error: Exception) -> str:
 
 
 @contextmanager
-def _said() -> Iterator[Callable[[], str]]:
+def _stderr_held_back() -> Iterator[Callable[[], str]]:
     """Hold back what libraries write to standard error; the function that is given returns it."""
     sys.stderr.flush()
     with tempfile.TemporaryFile() as file:
 
-        def said() -> str:
+        def written() -> str:
             file.seek(0)
             return file.read().decode(errors="replace")
 
         kept = os.dup(2)
         os.dup2(file.fileno(), 2)
         try:
-            yield said
+            yield written
         finally:
             os.dup2(kept, 2)
             os.close(kept)

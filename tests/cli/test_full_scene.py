@@ -34,9 +34,9 @@ def test_a_case_runs_alone_among_the_cars_of_its_recording(tmp_path):
     assert min(cars) > 10
     assert "106.1" in (tmp_path / "fcd.xml").read_text()
     assert '"112.1"' in (tmp_path / "lc.xml").read_text()
-    deaf = run(tmp_path, "us101-scene", "--set", "full_scene.heed_leader=false")
-    assert deaf["distance_m"] == pytest.approx(alone["distance_m"], abs=1e-6)
-    assert deaf["delay_s"] == pytest.approx(alone["delay_s"], abs=1e-6)
+    without_leader = run(tmp_path, "us101-scene", "--set", "full_scene.heed_leader=false")
+    assert without_leader["distance_m"] == pytest.approx(alone["distance_m"], abs=1e-6)
+    assert without_leader["delay_s"] == pytest.approx(alone["delay_s"], abs=1e-6)
 
 
 @pytest.mark.slow
@@ -51,7 +51,7 @@ def test_a_sweep_with_living_traffic_beside_it_and_its_report(tmp_path):
     with (tmp_path / "out/traffic.csv").open(newline="") as lines:
         logged, living = csv.DictReader(lines)
     assert float(logged["cars"]) > 10
-    assert (logged["hosts"], logged["throughput_veh_h"]) == ("", "")  # nobody counted them
+    assert (logged["hosts"], logged["throughput_veh_h"]) == ("", "")  # they are not counted
     assert (living["cars"], living["released"]) == ("", "")
     assert float(living["hosts"]) > 0
     report = merge_cosim("report", "out", cwd=tmp_path)

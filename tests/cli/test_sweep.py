@@ -371,7 +371,7 @@ def test_hidden_intentions_through_the_command_line(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     rows = summary(tmp_path / "out1")
-    assert set(rows) == {"slot-time", "pgm", "oracle-label"}  # nobody was logged
+    assert set(rows) == {"slot-time", "pgm", "oracle-label"}  # there is no logged host
     assert rows["pgm"]["against"] == "slot-time"
     assert rows["pgm"]["only_this_fails"] is not None
     assert rows["pgm"]["ci_high_pct"] > rows["pgm"]["failure_pct"]  # drawn cases are a sample

@@ -100,9 +100,9 @@ def test_order_and_label():
     assert swapped["host_first"] is True
     assert swapped["order_swapped"] is True
     assert swapped["correct_at_merge"] is False
-    nobody = row(host_reached_s=np.nan, merging_reached_s=np.nan)
-    assert nobody["host_first"] is None
-    assert nobody["host_reached"] is False
+    neither = row(host_reached_s=np.nan, merging_reached_s=np.nan)
+    assert neither["host_first"] is None
+    assert neither["host_reached"] is False
     assert row(host_reached_s=np.nan)["host_first"] is False
     assert row(case=encounters(host_station=1.0), host_reached_s=np.nan)["host_reached"] is True
     unlabelled = row(case=encounters(label=-1))

@@ -50,7 +50,7 @@ def test_a_bin_that_one_intention_hardly_saw_says_nothing():
     label = np.concatenate([np.arange(40) % 2, np.zeros(ENOUGH), np.ones(ENOUGH - 1)]).astype(int)
     fitted = SpeedGaussian.fit(before, before + change, label)
     np.testing.assert_allclose(fitted.mean_change[:, 2], change[40:].mean(), atol=1e-8)  # both of that bin
-    np.testing.assert_allclose(fitted.mean_change[:, 5], change.mean(), atol=1e-8)  # all: nobody was that fast
+    np.testing.assert_allclose(fitted.mean_change[:, 5], change.mean(), atol=1e-8)  # all: no car was that fast
     assert np.all(fitted.floored().log_ratio(np.array([12.0, 27.0]), np.array([12.3, 27.3])) == 0.0)
     assert np.all(fitted.floored().log_ratio(np.array([7.0]), np.array([7.3])) != 0.0)
 
