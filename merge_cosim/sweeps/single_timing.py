@@ -11,7 +11,9 @@ from merge_cosim.sweeps.task import Task
 from merge_cosim.sweeps.worker_session import WorkerSession
 
 SINGLE_CASES = 5
-"""Cases of each scenario that are run one at a time."""
+"""Most cases of each scenario that are run one at a time."""
+ONE_IN = 50
+"""One case, and another one for so many; otherwise a small sweep would spend most of its time here."""
 
 
 def time_single_cases(tasks: Sequence[Task]) -> dict[str, float]:
@@ -27,7 +29,8 @@ def time_single_cases(tasks: Sequence[Task]) -> dict[str, float]:
     for task in tasks:
         if task.variation or task.cases.scenes:
             continue
-        for run, _ in task.take(np.arange(min(SINGLE_CASES, len(task)))).runs(worker_session):
+        count = min(SINGLE_CASES, 1 + len(task) // ONE_IN, len(task))
+        for run, _ in task.take(np.arange(count)).runs(worker_session):
             efforts.setdefault(task.method.name, Effort()).add(run.effort)
     worker_session.close()
     return {name: 1e6 * e.method_s / e.encounter_cycles for name, e in efforts.items() if e.encounter_cycles}
