@@ -79,6 +79,8 @@ class DriverBlocks:
     def __init__(self, driver: HostDriver, size: int, setting: Setting) -> None:
         self._driver, self._size, self._setting = driver, size, setting
         self._blocks: list[HostDriver] = []
+        self._decided: set[int] = set()
+        """Blocks that have decided in the last cycle."""
 
     def make_room(self, slots: int) -> None:
         """Start as many blocks as the slots need."""
@@ -96,7 +98,14 @@ class DriverBlocks:
 
     def channel_values(self) -> FloatArray:
         """See `Controller.channel_values`; shape (channels, slots)."""
-        return np.concatenate([block.controller.channel_values() for block in self._blocks], axis=1)
+        none = np.full((len(self._driver.controller.channels), self._size), np.nan)
+        return np.concatenate(
+            [
+                block.controller.channel_values() if number in self._decided else none
+                for number, block in enumerate(self._blocks)
+            ],
+            axis=1,
+        )
 
     def rest(self, rows: IntArray) -> None:
         """See `Estimator.rest`."""
@@ -111,7 +120,9 @@ class DriverBlocks:
 
     def decide(self, seen: Observation, active: BoolArray) -> tuple[FloatArray, FloatArray]:
         """See `HostDriver.decide`; blocks without an active slot are left out, and their entries mean nothing."""
+        self._decided.clear()
         if len(self._blocks) == 1 and np.count_nonzero(active):
+            self._decided.add(0)
             return self._blocks[0].decide(seen)
         log_odds, acceleration = np.zeros((2, len(active)))
         for number, block in enumerate(self._blocks):
@@ -119,6 +130,7 @@ class DriverBlocks:
             if np.count_nonzero(active[own]):
                 part = Observation(*(getattr(seen, one.name)[own] for one in fields(Observation)))
                 log_odds[own], acceleration[own] = block.decide(part)
+                self._decided.add(number)
         return log_odds, acceleration
 
 

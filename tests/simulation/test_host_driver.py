@@ -111,6 +111,29 @@ def test_rows_that_rest_are_those_of_their_block():
     assert [one.estimator.resting for one in blocks._blocks] == [[0, 2], [1], [0, 2]]
 
 
+class Telltale(Acc):
+    """Has one channel, the speed of the host."""
+
+    name = "telltale"
+    channels = ("speed",)
+
+    def command(self, seen, log_odds, target):
+        self.speed = seen.host_speed
+        return super().command(seen, log_odds, target)
+
+    def channel_values(self):
+        return self.speed[None]
+
+
+def test_a_block_that_has_not_decided_has_no_channel_values():
+    blocks = DriverBlocks(HostDriver(AlwaysGo(), Telltale()), 1, Setting())
+    blocks.make_room(2)
+    blocks.reset(np.arange(2), np.zeros(2, dtype=int), np.zeros(2, dtype=np.uint64))
+    for active in ((False, True), (True, False)):  # the first has never decided, then the second has in another cycle
+        blocks.decide(SEEN, np.array(active))
+        assert np.isfinite(blocks.channel_values()).tolist() == [list(active)]
+
+
 def test_what_is_decided_comes_from_what_is_observed():
     """Until the sensor reports the merging car in the lane, a belief counts; each block keeps its own memory."""
     driver = HostDriver(AlwaysGo(), Acc(), Noisy(delay=0.2))
