@@ -188,10 +188,14 @@ def limit_files(sweep: Struck) -> bool:
 
 
 def limit_memory(sweep: Struck) -> bool:
-    """By a limit of memory."""
-    more = sweep.rng.randint(0, 8) << 20
-    sweep.before = lambda: resource.setrlimit(resource.RLIMIT_AS, (psutil.Process().memory_info().vms + more,) * 2)
-    return _end(sweep, sweep.begin()) != 0
+    """By a limit of memory, which from some moment on leaves its processes, or one of them, what they have mapped."""
+    child = sweep.begin()
+    sweep.moment()
+    with suppress(psutil.Error):
+        processes = [psutil.Process(child), *psutil.Process(child).children(recursive=True)]
+        for process in processes if sweep.rng.random() < 0.5 else [sweep.rng.choice(processes)]:
+            process.rlimit(psutil.RLIMIT_AS, (1 << 20, 1 << 20))
+    return _end(sweep, child) != 0
 
 
 def forbid_writing(sweep: Struck) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import multiprocessing
 import os
 import pickle
@@ -177,7 +178,7 @@ def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    watch_parent()
     if inherited is not None:
         inherited.close()  # else the worker would not notice the end of its parent process
     worker_session = WorkerSession()
@@ -197,6 +198,12 @@ def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path
         pass
     finally:
         worker_session.close()
+
+
+def watch_parent() -> None:
+    """End this process with its parent, from a thread; without memory for one it goes on to the end of its chunk."""
+    with suppress(RuntimeError):
+        _thread.start_new_thread(_end_with_parent, ())  # for want of memory `Thread.start` may wait for ever
 
 
 def _end_with_parent() -> None:

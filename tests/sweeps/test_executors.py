@@ -119,6 +119,29 @@ class Stuck(mc.Estimator):
         time.sleep(0.02)
 
 
+WITHOUT_MEMORY = """
+import os, resource, signal, threading
+from merge_cosim.sweeps.executors import watch_parent
+earlier = threading.Thread(target=int)  # its stack is used again, so that a thread begins and then fails
+earlier.start()
+earlier.join()
+child = os.fork()
+if child:
+    os._exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) and 1)
+resource.setrlimit(resource.RLIMIT_AS, (1 << 20, 1 << 20))
+signal.alarm(10)
+watch_parent()
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere the limit holds for other memory")
+def test_a_worker_without_memory_for_a_thread_does_not_wait_for_it():
+    assert (
+        subprocess.run([sys.executable, "-c", WITHOUT_MEMORY], stderr=subprocess.DEVNULL, check=False).returncode == 0
+    )
+
+
 @pytest.fixture
 def own_registry(monkeypatch):
     """What a test registers is gone after it: no other test of this process is to run a deadly estimator."""
