@@ -64,8 +64,7 @@ def sweep(
         against: Method that the others are compared with on the same cases; `pgm`, if it is run.
         plugins: Python files with components of your own.
         jobs: Processes; one per core, if not given. The rows do not depend on it.
-        start: How processes are started: `"spawn"`, `"fork"`, or `"auto"`, which is `"fork"` on Linux where there are
-            neither plugins nor threads.
+        start: How processes are started: `"spawn"`, `"forkserver"` or `"fork"`.
         dask: Address of a Dask scheduler to run on, or `"local"`.
         world: What moves the cars: `"sumo"`, or `"closed-form"` (`s' = s + v dt`, many times faster; pairs only).
         out: Result folder; a temporary one, kept as long as the returned object, if not given.

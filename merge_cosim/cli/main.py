@@ -58,7 +58,7 @@ app.add_typer(ramp.app, name="ramp")
 USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 """typer's UsageError; typer gives it no public name."""
 
-Start = Literal["auto", "spawn", "fork"]
+Start = Literal["spawn", "forkserver", "fork"]
 
 
 def _show_version(wanted: bool) -> None:
@@ -100,7 +100,7 @@ def sweep(
     against: Against = None,
     out: Annotated[Path, typer.Option(help="Result folder.")] = Path("out"),
     jobs: Jobs = None,
-    start: Annotated[Start, typer.Option(help="How processes are started.")] = "auto",
+    start: Annotated[Start, typer.Option(help="How processes are started.")] = "spawn",
     dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to run on, or 'local'.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Finish an interrupted sweep.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a sweep that is in the folder.")] = False,

@@ -7,7 +7,6 @@ import multiprocessing
 import os
 import pickle
 import signal
-import sys
 import threading
 import traceback
 from collections import Counter
@@ -79,14 +78,11 @@ class Processes:
     goes to a new worker. (The pool of the standard library breaks as a whole.)
 
     `spawn` starts every worker as a fresh interpreter, which is safe everywhere. `fork` copies this process, which
-    spares a worker its imports; it is refused where threads run, which a copy would not have. `auto` is `fork` where
-    nothing but this package can have begun threads, and `spawn` elsewhere.
+    spares a worker its imports; it is refused where threads run, which a copy would not have. (Those of numpy and
+    pyarrow are not seen by that.) `forkserver` copies a fresh process that has imported what workers need, no more.
     """
 
     def __init__(self, jobs: int, plugins: Sequence[Path] = (), start: StartMethod = "spawn") -> None:
-        if start == "auto":
-            only_thread = sys.platform == "linux" and not plugins and threading.active_count() == 1
-            start = "fork" if only_thread else "spawn"
         if start not in multiprocessing.get_all_start_methods():
             raise UserError(f"--start {start}: this system cannot; use --start spawn")
         if start == "fork" and threading.active_count() > 1:
@@ -94,6 +90,8 @@ class Processes:
         self._jobs = jobs
         self._plugins = tuple(plugins)
         self._context = multiprocessing.get_context(start)
+        if start == "forkserver":
+            self._context.set_forkserver_preload([__name__])
         self._workers: dict[Connection, _Worker] = {}
 
     def run(self, queue: ChunkQueue) -> Generator[Finished]:

@@ -43,7 +43,7 @@ from merge_cosim.sweeps.cases import LoggedCases, PairCases, TrafficCases
 from merge_cosim.sweeps.closed_form_cases import ClosedFormCases, side_by_side
 from merge_cosim.sweeps.task import Task
 
-StartMethod = Literal["auto", "spawn", "fork"]
+StartMethod = Literal["spawn", "forkserver", "fork"]
 ScenarioSpec: TypeAlias = str | Scenario | tuple[Scenario, Encounters]
 """Name or file of a scenario, a scenario, or one along with its encounters."""
 

@@ -55,7 +55,7 @@ def kill_workers(count, stop, killed):
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize("start", ["spawn", "fork", "auto"])
+@pytest.mark.parametrize("start", ["spawn", "forkserver", "fork"])
 def test_processes_give_the_rows_of_one(expected, start):
     assert rows(Processes(2, start=start)).equals(expected)
 
