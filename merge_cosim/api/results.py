@@ -27,7 +27,7 @@ from merge_cosim.report.run_command import run_command
 from merge_cosim.results.notes import note_lines
 from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics.summary import CASE
-from merge_cosim.results.store import ENSEMBLE_CSV, MANIFEST, RIVALS_CSV, SUMMARY_JSON, ResultFolder
+from merge_cosim.results.store import ENSEMBLE_CSV, MANIFEST, RIVALS_CSV, ResultFolder
 
 if TYPE_CHECKING:
     from merge_cosim.report.short_table import ShortTable
@@ -90,7 +90,7 @@ class Results:
         Example:
             >>> results.summary().set_index("method")["failure_pct"]  # doctest: +SKIP
         """
-        return pd.DataFrame(self._store.read_json(SUMMARY_JSON))
+        return pd.DataFrame(self._store.summary())
 
     def ensemble(self) -> pd.DataFrame:
         """Where methods were run with several models: one row per method with the median and range over models."""

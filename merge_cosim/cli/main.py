@@ -119,7 +119,7 @@ def sweep(
     """Run scenarios under methods and store one row per case."""
     from merge_cosim.api.sweep import sweep as run_sweep
     from merge_cosim.cli.interrupts import resumable
-    from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
+    from merge_cosim.results.store import ResultFolder
     from merge_cosim.scenarios.settings import parse_setting, parse_variation
 
     if resume + overwrite + add > 1:
@@ -151,7 +151,7 @@ def sweep(
             None if verify is None else results.verify(verify, data=data, model=model, plugins=plugin or (), jobs=jobs)
         )
     if json:
-        document = {"summary": ResultFolder(out).read_json(SUMMARY_JSON), "manifest": results.manifest}
+        document = {"summary": ResultFolder(out).summary(), "manifest": results.manifest}
         print_json(document | ({"verification": verification(again)} if again else {}))
     else:
         show_results(out, wide, columns)

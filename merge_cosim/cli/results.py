@@ -72,10 +72,10 @@ def summary(
     json: Json = False,
 ) -> None:
     """Show the table and the verdict of a finished sweep again."""
-    from merge_cosim.results.store import SUMMARY_JSON, ResultFolder
+    from merge_cosim.results.store import ResultFolder
 
     if json:
-        print_json(ResultFolder(folder).read_json(SUMMARY_JSON))
+        print_json(ResultFolder(folder).summary())
     elif verdict:
         from merge_cosim.report.short_table import short_tables
 

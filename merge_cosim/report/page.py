@@ -23,7 +23,7 @@ from merge_cosim.results.notes import note_lines
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.results.statistics.summary import GROUP, compare_all
 from merge_cosim.results.statistics.verdict import verdicts
-from merge_cosim.results.store import MANIFEST, NOTES_CSV, SUMMARY_JSON, ResultFolder
+from merge_cosim.results.store import MANIFEST, NOTES_CSV, ResultFolder
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
 
 REPORT = "report.html"
@@ -85,7 +85,7 @@ def read_report(folder: Path, against: str | None = None) -> Report:
         raise UserError(f"{folder}: nothing to report: no car merged next to a host; see its {NOTES_CSV}")
     manifest = store.read_json(MANIFEST)
     labels = [f"{name}={value}" for name, values in manifest["variations"] for value in values]
-    summary = tables.summary_frame(_compared(store.read_json(SUMMARY_JSON), results, against), labels)
+    summary = tables.summary_frame(_compared(store.summary(), results, against), labels)
     shown, left_out = fitting(store.traces.recorded())
     traces = store.traces.read(shown).to_pandas()
     recorded = recorded_cases(traces, results)

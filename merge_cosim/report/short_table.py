@@ -20,7 +20,7 @@ from merge_cosim.report.traffic_table import traffic_table
 from merge_cosim.results.files import readable
 from merge_cosim.results.statistics.summary import SECTION, is_sample
 from merge_cosim.results.statistics.verdict import verdicts
-from merge_cosim.results.store import MANIFEST, RESULTS, SUMMARY_JSON, ResultFolder
+from merge_cosim.results.store import MANIFEST, RESULTS, ResultFolder
 from merge_cosim.scenarios.methods import is_reference
 
 COLUMNS = (
@@ -106,7 +106,7 @@ def short_tables(path: Path, wide: bool = False, columns: Sequence[str] = ()) ->
     folder = ResultFolder(path)
     folder.check()
     manifest = folder.read_json(MANIFEST)
-    summary = pd.DataFrame(folder.read_json(SUMMARY_JSON))
+    summary = pd.DataFrame(folder.summary())
     if not len(summary):
         return []
     judged = verdicts(summary, rows_of_failures(folder) if is_sample(summary) else None)

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import refuse_file
-from merge_cosim.results.files import csv_rows, csv_table, read_json, write_text
+from merge_cosim.results.files import csv_rows, csv_table, read_json, readable, write_text
 from merge_cosim.results.invariants import joined
 from merge_cosim.results.merged_rows import Rows
 from merge_cosim.results.parts import BEFORE, Parts, with_facts
@@ -24,6 +24,8 @@ SCENES_CSV, TRAFFIC_CSV, NOTES_CSV = "scenes.csv", "traffic.csv", "notes.csv"
 STRATA_CSV, BELIEF_CSV, CALIBRATION_CSV = "strata.csv", "belief.csv", "calibration.csv"
 ENSEMBLE_CSV, RIVALS_CSV = "ensemble.csv", "rivals.csv"
 RESULTS, SUMMARY_CSV, SUMMARY_JSON, MANIFEST = "results.parquet", "summary.csv", "summary.json", "manifest.json"
+TEXTS = dict.fromkeys(("scenario", "variation", "site", "source", "method", "model"), str) | {"against": str | None}
+"""Columns of the summary that are texts; all others are numbers."""
 OF_SCENE = ("scenario", "variation", "method", "scene")
 """What names a scene in the tables of scenes."""
 
@@ -127,6 +129,24 @@ class ResultFolder:
         """What the invariants of a finished sweep came to."""
         found: dict[str, Any] = self.read_json(MANIFEST).get("invariants") or joined(())
         return found
+
+    def summary(self) -> list[dict[str, Any]]:
+        """Rows of the finished sweep's summary.
+
+        Raises:
+            UserError: They are missing or damaged.
+        """
+        rows: list[dict[str, Any]] = self.read_json(SUMMARY_JSON)
+        with readable(self.path / SUMMARY_JSON):
+            if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+                raise ValueError("no list of rows")
+            for row in rows:
+                if row.keys() != rows[0].keys():
+                    raise ValueError("rows of different columns")
+                for name, value in row.items():
+                    if not isinstance(value, TEXTS.get(name, int | float | None)):
+                        raise ValueError(f"{name} is {value!r}")
+        return rows
 
     def table(self, name: str) -> pd.DataFrame:
         """One of the folder's CSV tables; empty where there is none."""

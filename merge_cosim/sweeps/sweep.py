@@ -77,7 +77,7 @@ class _Earlier:
 
     @classmethod
     def of(cls, folder: ResultFolder) -> _Earlier:
-        rows = folder.read_json(SUMMARY_JSON)
+        rows = folder.summary()
         times = {row["method"]: (row["cycle_us"], row["cycle_us_single"]) for row in rows if row["cycle_us"]}
         return cls(folder.traces.recorded()[NO_RECORDS.columns], times)
 

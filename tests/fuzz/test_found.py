@@ -195,6 +195,15 @@ def test_a_result_folder_with_one_other_byte(tmp_path: Path) -> None:
         file.write_bytes(content)
         with pytest.raises(UserError, match=rf"{name}: damaged"):
             read()
+    summary = json.loads((tmp_path / "out/summary.json").read_text())
+    for rows, why in (
+        ([summary[0], summary[0] | {"n": "27"}], "n is '27'"),
+        ([summary[0], summary[0] | {"source": None}], "source is None"),
+        ([summary[0], {"scenario": "s"}], "rows of different columns"),
+        ({"scenario": "s"}, "no list of rows"),
+    ):
+        (tmp_path / "out/summary.json").write_text(json.dumps(rows))
+        assert f"summary.json: damaged ({why}); run the sweep again" in refused("summary", "out", cwd=tmp_path)
     for content in (b"scenario,n\nx,\xff", b"scenario,n\nx", b"outside_support,n\n1,y"):
         (tmp_path / "out/summary.csv").write_bytes(content)
         with pytest.raises(UserError, match=r"summary\.csv: damaged"):

@@ -12,7 +12,7 @@ from merge_cosim.report.tables import ranges, summary_frame
 from merge_cosim.results.statistics.comparison import clusters_of, compare
 from merge_cosim.results.statistics.paired import mean_difference
 from merge_cosim.results.statistics.summary import ALL_SITES, ALL_STARTS, is_sample
-from merge_cosim.results.store import BELIEF_CSV, SUMMARY_JSON, ResultFolder
+from merge_cosim.results.store import BELIEF_CSV, ResultFolder
 from merge_cosim.studies.reproduction import DESIGNED, MODEL_SWEEP, NODE_SWEEP, PAIRS, Study
 
 
@@ -113,7 +113,7 @@ def _beliefs(folder: Path) -> pd.DataFrame:
 
 
 def _summary(folder: ResultFolder) -> pd.DataFrame:
-    frame = summary_frame(folder.read_json(SUMMARY_JSON))
+    frame = summary_frame(folder.summary())
     low, high = (frame[f"distance_{end}_m"] for end in ("low", "high"))
     frame["distance_interval_m"] = ranges(low, high)
     return frame
