@@ -198,3 +198,12 @@ def test_a_summary_of_batches_is_that_of_the_whole(monkeypatch, most_clusters):
     assert row["min_ttc_s_p05"] == pytest.approx(acc["min_ttc_s"].quantile(0.05), abs=1e-6)
     assert row["hardest_braking_p95"] == pytest.approx(acc["hardest_braking"].quantile(0.95), abs=1e-6)
     assert row["distance_m"] == pytest.approx(acc["distance_m"].mean(), abs=1e-6)
+
+
+def test_cars_of_two_batches_stay_apart(monkeypatch):
+    monkeypatch.setattr(totals, "MOST_CLUSTERS", 2)
+    clusters = totals.Clusters()
+    for first in (0, 3):  # a car may also have rows in another batch, so none of these is whole
+        cars = pd.Series([f"car {first + i}" for i in range(3)])
+        clusters.add(pd.DataFrame({"value": [1.0, 2.0, 3.0]}), cars, whole=False)
+    assert clusters.number == 6

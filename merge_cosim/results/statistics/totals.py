@@ -101,7 +101,7 @@ class Clusters:
         """
         numbers = values.astype(float)
         known = numbers.notna().astype(int)
-        if len(clusters) > MOST_CLUSTERS and clusters.is_unique:
+        if whole and len(clusters) > MOST_CLUSTERS and clusters.is_unique:
             sums, counts = numbers.fillna(0.0), known
         else:
             by = clusters.to_numpy()
