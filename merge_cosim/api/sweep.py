@@ -37,7 +37,7 @@ def sweep(
     resume: bool = False,
     overwrite: bool = False,
     add: bool = False,
-    traces: Literal["all", "failed", "disagreeing"] | int | None = None,
+    traces: Literal["all", "failed", "telling"] | int | None = None,
     unchecked_ramp: bool = False,
     progress: bool = True,
 ) -> Results:
@@ -73,7 +73,7 @@ def sweep(
         add: Add methods, variations, scenarios or cases to the finished sweep in `out`, of the same settings; its rows
             are then those of one sweep of all. Without `methods`, those that it holds.
         traces: Cases of each scenario that are recorded cycle by cycle, to be watched in the report: `"all"`,
-            `"failed"`, `"disagreeing"` (the methods disagree; up to 200), or a number, those of disagreement
+            `"failed"`, `"telling"` (the methods disagree; up to 200), or a number, those of disagreement
             first. A few of these, if not given. With `add` and nothing else new, traces are added to a finished sweep.
         unchecked_ramp: Run on a ramp that does not pass `ramp check`, too, which is refused otherwise.
         progress: Show how far the sweep is, on standard error.

@@ -86,7 +86,7 @@ class SweepRequest:
     against: str | None = None
     world: WorldKind = "sumo"
     unchecked_ramp: bool = False
-    traces: Literal["all", "failed", "disagreeing"] | int | None = None
+    traces: Literal["all", "failed", "telling"] | int | None = None
 
 
 def plan(request: SweepRequest) -> list[Task]:

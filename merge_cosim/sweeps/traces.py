@@ -19,7 +19,7 @@ from merge_cosim.sweeps.forecast import LONG_S, duration, seconds
 from merge_cosim.sweeps.plan import SweepRequest
 from merge_cosim.sweeps.task import Task
 
-Traces: TypeAlias = Literal["all", "failed", "disagreeing"] | int | None
+Traces: TypeAlias = Literal["all", "failed", "telling"] | int | None
 """Cases of each scenario that are recorded: all; those that fail under a method; those on which the methods disagree
 (no more than `MOST_DISAGREEING`); a number of them, those of disagreement first. None: a few of
 disagreement, and none of living traffic, whose scenes would have to be run again."""
@@ -39,11 +39,11 @@ def parse_traces(text: str | int | None) -> Traces:
         UserError: It is none of that.
     """
     match text:
-        case "all" | "failed" | "disagreeing" | None:
+        case "all" | "failed" | "telling" | None:
             return text
     if str(text).isdecimal() and int(str(text)) > 0:
         return int(str(text))
-    raise UserError(f"--traces {text}: give all, failed, disagreeing, or a number of cases")
+    raise UserError(f"--traces {text}: give all, failed, telling, or a number of cases")
 
 
 def record(
@@ -122,7 +122,7 @@ def choose(batches: Iterable[pd.DataFrame], wanted: Traces) -> list[str]:
         batches: Result rows of one scenario, in batches of whole cases: `case` and `COLUMNS`.
         wanted: Which of them.
     """
-    most = wanted if isinstance(wanted, int) else {None: A_FEW, "disagreeing": MOST_DISAGREEING}.get(wanted)
+    most = wanted if isinstance(wanted, int) else {None: A_FEW, "telling": MOST_DISAGREEING}.get(wanted)
     ranked, count = pd.DataFrame(), 0
     for rows in batches:
         found = _by_case(rows)
@@ -137,7 +137,7 @@ def choose(batches: Iterable[pd.DataFrame], wanted: Traces) -> list[str]:
     disagreeing = ranked[~ranked["agreed"]] if not ranked["agreed"].all() else ranked[:1]
     if wanted is None:
         chosen = disagreeing[: min(A_FEW, 1 + count // ONE_IN)]
-    elif wanted == "disagreeing":
+    elif wanted == "telling":
         chosen = disagreeing[:most]
     else:
         chosen = ranked[ranked["failed"]] if wanted == "failed" else ranked[:most]

@@ -35,7 +35,7 @@ def rows(**failing):
     ("wanted", "cases"),
     [
         (None, ["both"]),  # a few: one of seven
-        ("disagreeing", ["both", "one", "too", "one_too"]),  # each set of methods once, then again
+        ("telling", ["both", "one", "too", "one_too"]),  # each set of methods once, then again
         ("failed", ["both", "one", "too", "one_too", "every"]),
         (5, ["both", "one", "too", "one_too", "none_too"]),
         ("all", ["both", "one", "too", "one_too", "none_too", "every", "none"]),
@@ -110,5 +110,5 @@ def test_a_page_takes_as_many_cases_as_it_has_room_for_from_every_scenario():
 
 @pytest.mark.parametrize("wrong", ["some", "0", "-1", "1.5"])
 def test_another_wish_is_one_line(tmp_path, wrong):
-    with pytest.raises(mc.UserError, match=r"give all, failed, disagreeing, or a number of cases"):
+    with pytest.raises(mc.UserError, match=r"give all, failed, telling, or a number of cases"):
         swept(tmp_path / "out", traces=wrong)
