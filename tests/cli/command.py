@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -48,6 +49,9 @@ def merge_cosim(*arguments: object, cwd: Path, **environment: str) -> subprocess
         for registry in (estimators, controllers, merging_cars, sensors):
             registry.names()  # our own classes are registered from now on
             stack.enter_context(patch.dict(registry._classes))
+        stack.enter_context(patch.object(sys, "unraisablehook", sys.unraisablehook))
+        for number in (signal.SIGINT, signal.SIGTERM):
+            stack.callback(signal.signal, number, signal.getsignal(number))
         output, error = (stack.enter_context(_written(*stream)) for stream in (("stdout", 1), ("stderr", 2)))
         try:
             main()

@@ -16,9 +16,11 @@ FAMILY = "sleep 60 & echo $! $$ > pids.new; mv pids.new pids; wait"
 """A shell and its child."""
 
 CALLER = f"""
+import signal
 from pathlib import Path
 from merge_cosim.cli.interrupts import ended_by_signal
 from merge_cosim.core.programs import run_program
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
 ended_by_signal()
 run_program(["sh", "-c", {FAMILY!r}], 60.0, Path("file"))
 """

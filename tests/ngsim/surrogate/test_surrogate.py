@@ -140,5 +140,5 @@ def test_the_surrogate_is_copied_for_other_programs(tmp_path: Path) -> None:
     assert copy == tmp_path / "out" / "us101-surrogate.parquet"
     assert copy.read_bytes() == (surrogate_folder(US101) / copy.name).read_bytes()
     (tmp_path / "file").touch()
-    with pytest.raises(UserError, match="file: cannot be written to"):
+    with pytest.raises(UserError, match="file: is a file; --out names a folder"):
         export(US101, tmp_path / "file")
