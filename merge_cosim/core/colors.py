@@ -8,7 +8,7 @@ BLUE, SKY, GREEN, ORANGE = "#0072B2", "#56B4E9", "#009E73", "#E69F00"
 YELLOW, VERMILION, PURPLE, BLACK = "#F0E442", "#D55E00", "#CC79A7", "#000000"
 """Okabe and Ito."""
 INDIGO, WINE, BROWN, OLIVE = "#332288", "#882255", "#661100", "#999933"
-"""Tol's 'muted', and the brown that he adds to it."""
+"""Tol's 'muted'; the brown is of its older version with twelve colours."""
 INK, GREY, SILVER, PALE, FAINT = "#111111", "#6b6b6b", "#a3a3a3", "#d0d0d0", "#e4e4e4"
 """Texts, then ever lighter lines and areas."""
 

@@ -12,9 +12,10 @@ from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.demand import write_traffic
 from merge_cosim.sumo.floating_car_data import read_floating_cars
 from merge_cosim.sumo.outputs import SumoOutputs
-from merge_cosim.sweeps.cases import LoggedCases, TrafficCases
+from merge_cosim.sweeps.cases import LoggedCases
 from merge_cosim.sweeps.single import trace_case
 from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.traffic_cases import TrafficCases
 
 USUAL_LENGTH = 5.0
 """Length of a car whose type does not say it: SUMO's default [m]."""

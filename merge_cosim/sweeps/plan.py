@@ -39,9 +39,10 @@ from merge_cosim.simulation.worlds.traffic import TRAFFIC
 from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.lane_map import LaneMap
 from merge_cosim.sumo.vehicle_types import ROLE
-from merge_cosim.sweeps.cases import LoggedCases, PairCases, TrafficCases
+from merge_cosim.sweeps.cases import LoggedCases, PairCases
 from merge_cosim.sweeps.closed_form_cases import ClosedFormCases, side_by_side
 from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.traffic_cases import TrafficCases
 
 StartMethod = Literal["spawn", "forkserver", "fork"]
 ScenarioSpec: TypeAlias = str | Scenario | tuple[Scenario, Encounters]

@@ -18,9 +18,10 @@ from merge_cosim.sumo.demand import write_traffic
 from merge_cosim.sumo.outputs import SumoOutputs
 from merge_cosim.sumo.routes import write_encounter
 from merge_cosim.sumo.start import QUIT, connection_kept
-from merge_cosim.sweeps.cases import RunOptions, TrafficCases, refuse_empty
+from merge_cosim.sweeps.cases import RunOptions
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.task import Task
+from merge_cosim.sweeps.traffic_cases import TrafficCases, refuse_empty
 from merge_cosim.sweeps.worker_session import WorkerSession
 
 NO_OUTPUTS = SumoOutputs()

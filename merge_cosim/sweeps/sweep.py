@@ -35,7 +35,6 @@ from merge_cosim.results.traces import NO_RECORDS
 from merge_cosim.scenarios.methods import ORACLE_BEST
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.adding import joined, missing
-from merge_cosim.sweeps.cases import refuse_empty
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
 from merge_cosim.sweeps.executors import Executor, executor_for
 from merge_cosim.sweeps.forecast import LONG_S, forecast, seconds
@@ -44,6 +43,7 @@ from merge_cosim.sweeps.plan import SweepRequest, plan, refuse_unsound_ramps
 from merge_cosim.sweeps.single_timing import time_single_cases
 from merge_cosim.sweeps.task import Task
 from merge_cosim.sweeps.traces import record
+from merge_cosim.sweeps.traffic_cases import refuse_empty
 
 __all__ = ["SweepRequest", "plan", "sweep"]
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from scene_files import SMALL
 
 SCENARIO = """
 title = "Nine cases"
@@ -40,25 +41,7 @@ MANY = (
     "acc,slot,slot-time,ipcb,pgm-g,pgm,pgm-symmetric,pgm-time,pgm-speed,fg,fg-time,fg-gmm,acc+lqr,slot+lqr,pgm+lqr,"
     f"{LONG},{LONG}+lqr-direct,always-go,always-yield,oracle-best"
 )
-TRAFFIC = """
-title = "Half a minute of traffic"
-about = "Cars on the ramp."
-ramp = "us101"
-
-[encounters]
-kind = "traffic"
-replications = 1
-
-[encounters.demand]
-duration = 30
-warm_up = 5
-through = 3000
-merging = 900
-hosts = 700
-
-[merging]
-model = "sumo"
-"""
+TRAFFIC = SMALL.replace("replications = 3", "replications = 1").replace("duration = 60", "duration = 30")
 SURROGATE = ("--source", "surrogate", "--method", "acc,pgm", "--model", "us101-ngsim")
 FEW = ("--set", "encounters.fraction=0.97")
 SWEEPS = {

@@ -84,7 +84,7 @@ def test_bounds_are_for_two_cars():
         bounds_of("designed-2", {"test.overlap_from": "lane_change"}, None, None)
 
 
-def test_soonest_against_every_sequence_of_accelerations():
+def test_the_earliest_passage_against_every_sequence_of_accelerations():
     rules = Rules(horizon=0.3, time_out=0.8)
     for host, speed, merging in (
         (-1.5, 4.0, steady(-0.5, 9.0)),
@@ -136,7 +136,7 @@ def programme(ahead, station, speed, goal, arrival, end, limit=29.0):
 
 
 @pytest.mark.parametrize(("host", "speed", "merging"), [(-30.0, 15.0, (-10.0, 6.0)), (-60.0, 20.0, (-35.0, 10.0))])
-def test_soonest_against_a_linear_programme(host, speed, merging):
+def test_the_earliest_passage_against_a_linear_programme(host, speed, merging):
     log = steady(*merging, cycles=200)
     ahead = Ahead.of(pair(host, speed, log), 0, Rules())
     found = round(earliest_pass_behind(ahead, host, speed, 50.0, Reach(29.0)) / DT)

@@ -77,7 +77,7 @@ def host_acceleration(
 
 
 @njit(cache=True)
-def soonest(way: float, speed: float, limit: float, host: HostLaw) -> float:
+def least_time(way: float, speed: float, limit: float, host: HostLaw) -> float:
     """A time [s] that is surely not above what a rollout takes for the rest of the way to the goal."""
     if way > 4.0 * limit / host.k_free:  # there the speed after the rollout may be taken to be above the limit
         return 0.0
@@ -120,7 +120,7 @@ def rollout(
     change = host.change * host.step
     for _ in range(host.steps):
         if reached < 0.0:
-            sure = time + soonest(goal - host_station, host_speed, limit, host)
+            sure = time + least_time(goal - host_station, host_speed, limit, host)
         if host.progress * sure + host.effort * effort + extra > enough:
             return np.inf, 0.0
         wanted = host_acceleration(policy, held, host_station, host_speed, station, speed, length, host, limit)
@@ -192,8 +192,8 @@ def expected_cost(
             left += belief[row, kind]
         if belief[row, kind] > belief[row, likeliest]:
             likeliest = kind
-    soon = host.progress * soonest(max(h, 0.0) + host.goal - h, v, law.speed_limit, host)
-    for number in range(-1, belief.shape[1]):  # the likeliest type first, which tells soonest that the cost is too high
+    soon = host.progress * least_time(max(h, 0.0) + host.goal - h, v, law.speed_limit, host)
+    for number in range(-1, belief.shape[1]):  # the likeliest type first: its cost alone often exceeds the limit
         kind = likeliest if number < 0 else number
         share = belief[row, kind]
         if share < least or number == likeliest:

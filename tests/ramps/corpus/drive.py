@@ -10,7 +10,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from corpus_ramps import CORPUS, NETS, Case
+from corpus_case import Case
+from corpus_maps import OSM
+from corpus_nets import NETS
 
 import merge_cosim as mc
 from merge_cosim.core.errors import UserError
@@ -42,7 +44,7 @@ def outcome(case: Case, folder: Path) -> str:
 def main() -> int:
     """Run the command."""
     ends = {}
-    for case in CORPUS:
+    for case in [*OSM, *NETS]:
         with tempfile.TemporaryDirectory() as scratch:
             ends[case.name] = outcome(case, Path(scratch))
     counts = {end: list(ends.values()).count(end) for end in ("right", "refused")}

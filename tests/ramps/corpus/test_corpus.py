@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 from command import merge_cosim
-from corpus_ramps import CORPUS, NETS, OSM, Case
+from corpus_case import Case
+from corpus_maps import OSM
+from corpus_nets import NETS
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.check import check
@@ -26,7 +28,7 @@ def ways(edges: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(re.sub(r"^-|[#-].*$", "", edge) for edge in edges))
 
 
-TAKEN, REFUSED = ([case for case in CORPUS if bool(case.refused) is refused] for refused in (False, True))
+TAKEN, REFUSED = ([case for case in [*OSM, *NETS] if bool(case.refused) is refused] for refused in (False, True))
 
 
 @pytest.mark.parametrize("case", TAKEN, ids=[case.name for case in TAKEN])
@@ -56,7 +58,7 @@ def test_it_is_refused_with_the_reason(tmp_path: Path, case: Case) -> None:
 
 @pytest.mark.parametrize("name", DRIVEN)
 def test_it_is_made_passes_its_check_and_is_driven(tmp_path: Path, name: str) -> None:
-    (case,) = (case for case in CORPUS if case.name == name)
+    (case,) = (case for case in [*OSM, *NETS] if case.name == name)
     make = ramp_from_net if case in NETS else ramp_from_osm
     folder = make(tmp_path / "mine", case.make(tmp_path), **(case.numbers or {}))
     assert check(folder) == []
