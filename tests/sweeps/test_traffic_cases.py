@@ -23,8 +23,8 @@ def test_scenes_without_a_meeting_are_refused_with_the_reason():
     refuse_empty([], "here")  # of pairs there are no facts
     refuse_empty([{"meetings": 0, "notes": []}, {"meetings": 1, "notes": []}], "here")
     with pytest.raises(
-        UserError, match="^here: nothing to measure: hosts and merging cars never came near each other$"
+        UserError, match=r"^here: nothing to measure: hosts and merging cars never came near each other$"
     ):
         refuse_empty([{"meetings": 0, "notes": []}], "here")
-    with pytest.raises(UserError, match="^here: nothing to measure: no host came$"):
+    with pytest.raises(UserError, match=r"^here: nothing to measure: no host came$"):
         refuse_empty([{"meetings": 0, "notes": [(str(Event.NO_HOST), "no host came")]}], "here")
