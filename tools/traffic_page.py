@@ -3,13 +3,14 @@
     python tools/traffic_page.py [--from DIR ...]
 
 runs one `merge-cosim sweep` of the three traffic scenarios (about a quarter of an hour on two cores) and sets its
-summary, and its table of the traffic as a whole, into the page's block. With `--from` it takes result folders of the
-same scenes under different methods instead.
+summary, its table of the traffic as a whole, and what they say in short, into the page's blocks. With
+`--from` it takes result folders of the same scenes under different methods instead.
 """
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from textwrap import fill
 
 import pandas as pd
 from blocks import fill_page, page_parser, table
@@ -52,7 +53,47 @@ def main(argv: Sequence[str] | None = None) -> None:
         own = [rows[rows["scenario"] == scenario] for rows in (summary, traffic)]
         parts += [f"### {scenario}", "", by_method(*own)]
     made = "\n".join([*parts, ""])
-    fill_page("traffic.md", given.docs, {"tables": lambda _: made})
+    short = in_short(summary, traffic)
+    fill_page("traffic.md", given.docs, {"tables": lambda _: made, "short": lambda _: short})
+
+
+def in_short(summary: pd.DataFrame, traffic: pd.DataFrame) -> str:
+    """What the tables say about the methods that estimate and decide, in a few sentences."""
+    methods = [method for method in in_order(summary["method"]) if method not in BOUNDS]
+    counts = summary.groupby("method")[["failures", "n"]].sum().astype(int).loc[methods]
+    counts["low"], counts["high"] = zip(*map(wilson, counts["failures"], counts["n"]), strict=True)
+    none, worst = counts[counts["failures"] == 0], counts.loc[counts["low"].idxmax()]
+    parts = []
+    if len(none):
+        parts.append(
+            f"No failure under {_listed(none.index)} in {none['n'].min()} to {none['n'].max()} meetings each: at most "
+            f"{none['high'].max():.1f} % (Wilson 95 %). "
+        )
+    if worst["failures"]:
+        apart = list(counts.index[counts["high"] < worst["low"]])
+        parts.append(
+            f"Most under {worst.name}, {worst['failures']:.0f} of {worst['n']:.0f} ({worst['low']:.1f}–"
+            f"{worst['high']:.1f} %); "
+        )
+        parts.append(
+            f"the intervals of {_listed(apart)} lie below that. " if apart else "no interval lies below that. "
+        )
+    stops = traffic.groupby("method")[["merging_stopped", "meetings"]].sum().loc[methods]
+    share = (100 * stops["merging_stopped"] / stops["meetings"]).sort_values()
+    parts.append(
+        f"The merging car stops before it merges in {share.iloc[0]:.1f} % of the meetings under {share.index[0]}, in "
+        f"{share.iloc[-1]:.1f} % under {share.index[-1]}. "
+    )
+    flow = traffic[traffic["method"].isin(methods)].groupby("scenario")["throughput_veh_h"].agg(["min", "max"])
+    parts.append(
+        f"Cars out per hour differ by at most {100 * (1 - flow['min'] / flow['max']).max():.1f} % by the method."
+    )
+    return fill("".join(parts), 120, break_on_hyphens=False) + "\n"
+
+
+def _listed(names: Iterable[str]) -> str:
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def together(summary: pd.DataFrame, traffic: pd.DataFrame) -> str:

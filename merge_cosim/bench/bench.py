@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event, Thread
@@ -26,7 +26,10 @@ from merge_cosim.sweeps.identity import versions
 
 HEAD = """# Bench
 
-How fast merge-cosim is on one machine, made by
+How fast merge-cosim is on one machine. In short:
+
+{conclusion}
+Made by
 
 ```
 {command}
@@ -49,8 +52,8 @@ starts SUMO for every case, `traci` talks to one sumo over a socket (the wait fo
 WORLDS = """## SUMO and the closed form
 
 Processor time per vehicle and step [us] by method in one process, scoring and result rows included: `{world_scenario}`
-in SUMO ({cases} cases), and with `--world closed-form` (all cases). `update_us` is the wall
-time of it that estimator and controller take: the rest is the loop's.
+in SUMO ({cases} cases), and with `--world closed-form` (all cases). "Of it estimator and controller" is wall time: the
+rest is the loop's.
 """
 UPDATES = """## One update of each estimator
 
@@ -73,12 +76,12 @@ SCENES = """## Living traffic
 
 `{scene_scenario}` on {copies} copies of the ramp in one process, three minutes from empty, hosts driven by
 `{scene_method}`. The real-time factor is simulated time over wall time of the whole loop, observing, estimating and
-commanding included; `cars` is the mean over the run.
+commanding included; cars are the mean over the run.
 """
 SCALING = """## Whole sweeps by cases and processes
 
-`designed-random` under `acc`. `run_s` is the time with all processes at work, their start included; `loop_ms_per_case`
-is the time in the loops, summed over processes; `peak_mib` is the peak memory of the largest process.
+`designed-random` under `acc`. "Run" is the time with all processes at work, their start included; "in the loops" is
+summed over processes; the memory is the peak of the largest process.
 """
 OTHER = """## Another version
 
@@ -89,6 +92,36 @@ AGAINST = """## Against the bench of {before_date}
 Ratios of processor times within one run, which hold across machines better than times do; larger is better. One that
 fell by more than {tolerance} % is marked.
 """
+NAMES = {
+    "sumo_cpu_us": "in SUMO",
+    "closed_form_cpu_us": "in closed form",
+    "update_us": "of it estimator and controller",
+    "closed_form_is_cheaper_by": "SUMO / closed form",
+    "full_batch_us": "in a full batch",
+    "alone_us": "alone",
+    "steps_per_cpu_s": "steps per s",
+    "vehicle_steps_per_cpu_s": "vehicle-steps per s",
+    "ours_makes_more_by": "ours makes more by",
+    "meetings": "meetings",
+    "real_time_factor": "real-time factor",
+    "us_per_vehicle_step": "us per vehicle and step",
+    "ratio_to_bare_sumo": "time / SUMO's bare steps",
+    "wall_s": "wall [s]",
+    "plan_s": "plan [s]",
+    "run_s": "run [s]",
+    "store_s": "store [s]",
+    "cpu_s": "cpu [s]",
+    "ms_per_case": "run per case [ms]",
+    "loop_ms_per_case": "in the loops per case [ms]",
+    "peak_mib": "memory [MiB]",
+    "other_cpu_s": "other's cpu [s]",
+    "cpu_ratio": "ratio of cpu",
+    "loop_s": "loop [s]",
+    "other_loop_s": "other's loop [s]",
+    "loop_ratio": "ratio of loops",
+    "change_pct": "change [%]",
+}
+"""Heads of the page's tables, where they are not the names of the figures."""
 MOST = 10_000
 """Cases with which growth over methods is measured and another version compared, at most."""
 TOLERANCE = 0.15
@@ -221,6 +254,7 @@ def page(found: Mapping[str, Any], command: str, before: Mapping[str, Any] | Non
     parts = [
         HEAD.format(
             command=command,
+            conclusion="".join(f"- {one}\n" for one in conclusion(found)),
             machine=f"{described}; {versions_used}",
             load=""
             if load_before is None
@@ -252,6 +286,38 @@ def page(found: Mapping[str, Any], command: str, before: Mapping[str, Any] | Non
     return "\n".join(filter(None, parts))
 
 
+def conclusion(found: Mapping[str, Any]) -> Iterator[str]:
+    """What each part that was taken says, a sentence or two each."""
+    taken = [part for part in PARTS if found.get(part) or part in found["load"]]
+    if "loops" in taken:
+        speedups = [f"{found[f'cpu_speedup_vs_{name}']:.3g} times as fast as `{name}`" for name in ALTERNATIVES]
+        yield (
+            f"In SUMO one process moves {found['vehicle_steps_per_s']:,} vehicles by a step per second; its wall time "
+            f"is {found['ratio_to_bare_sumo']:.2f} times that of SUMO's own steps. By processor time it is "
+            f"{', '.join(speedups)}, the obvious ways to write the loop (below)."
+        )
+    if "worlds" in taken:
+        rows = sorted(found["worlds"], key=lambda row: row["closed_form_is_cheaper_by"])
+        low, high = (f"{row['closed_form_is_cheaper_by']} ({row['method']})" for row in (rows[0], rows[-1]))
+        yield f"In closed form an encounter takes from {low} to {high} times less processor time than in SUMO."
+    if "scaling" in taken:
+        largest = found["scaling"][-1]
+        took = f"{largest['wall_s']:.0f} s on {largest['processes']} processes"
+        yield f"{largest['cases']:,} encounters in SUMO under `acc` take {took}."
+    if "scenes" in taken:
+        factors = [row["real_time_factor"] for row in found["scenes"]]
+        cars = max(row["cars"] for row in found["scenes"])
+        yield f"Living traffic with {cars:,} cars runs {min(factors)} to {max(factors)} times as fast as real time."
+    if "peers" in taken:
+        more = [
+            f"{row['ours_makes_more_by']:,.0f} times as many as {row['simulator']}"
+            for row in found["peers"][1:]
+            if row["ours_makes_more_by"] is not None
+        ]
+        if more:
+            yield f"Steps of a scene per second of processor time, by the vector environment: {', '.join(more)}."
+
+
 def _loops(found: Mapping[str, Any]) -> str:
     rows = [
         {
@@ -273,7 +339,7 @@ def _gains(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     largest = rows[-1]
     return [
         f"Over {largest['cases']:,} cases {largest['processes']} processes are "
-        f"{alone['run_s'] / largest['run_s']:.2f} times as fast as {alone['processes']} by `run_s`, and "
+        f"{alone['run_s'] / largest['run_s']:.2f} times as fast as {alone['processes']} by the time of the run, and "
         f"{alone['wall_s'] / largest['wall_s']:.2f} times with planning and summing up, done by one.\n"
         for alone in rows
         if alone["cases"] == largest["cases"] and alone is not largest
@@ -293,7 +359,8 @@ def _only(found: Mapping[str, Any], *names: str) -> dict[str, Any]:
 
 def _table(rows: Sequence[Mapping[str, Any]]) -> str:
     names = list(rows[0])
-    lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    heads = [NAMES.get(name, name) for name in names]
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(names)]
     lines += ["| " + " | ".join(str(row[name]) for name in names) + " |" for row in rows]
     return "\n".join(lines) + "\n"
 

@@ -80,6 +80,20 @@ def test_robustness(tmp_path, monkeypatch):
     assert made_like(tmp_path, "tests.md").count("%, ") >= 2 * 10
 
 
+def test_what_another_model_changes():
+    rates = {"acc": {"": (3.0, 4.0)}, "pgm": {"m0": (2.0, 5.0), "m1": (3.5, 3.0)}}
+    section = {"scenario": "designed-3", "site": "", "source": ""}
+    rows = [
+        section | {"method": method, "model": model, "variation": error, "failed_or_stuck_pct": rate}
+        for method, models in rates.items()
+        for model, both in models.items()
+        for error, rate in zip(("", "sensing.delay=1"), both, strict=True)
+    ]
+    text = " ".join(robustness_page.under_models(pd.DataFrame(rows)).split())
+    assert "acc and pgm fails or gets stuck less depends on the model in 2 of the 2 rows (acc under 1 of the 2)" in text
+    assert "pgm gets worse by these errors under some of the models only: `sensing.delay=1` (1)" in text
+
+
 def test_robustness_runs(tmp_path):
     ends = {"same": 2, "wrong": 1}
     part = {"mutants": 90, "run": 4, "killed": 3, "survived": ["merge_cosim/a.py:3 core/AddNot"]}
