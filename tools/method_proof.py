@@ -2,19 +2,21 @@
 
 The blocks `<!-- proof: NAME -->` ... `<!-- end -->` of docs/methods/interactive.md are tables of sweeps, each with the
 command that gives the same figures. `<!-- choice: CASE -->` shows why policies were chosen in a case of Designed Test
-III, `<!-- escapes: all -->` how often there is an escape, `<!-- losses: all -->` when the failed cases lost theirs.
+III, `<!-- escapes: all -->` how often there is an escape, `<!-- losses: all -->` when the failed cases lost theirs,
+`<!-- short: all -->` what the tables say about `interactive` beside the best of the others.
 Without --data, tables of logged cars stay as they are; with --again only the rows of these methods are made anew.
 """
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from blocks import BLOCK, DOCS, fill_page, page_parser, table
+from blocks import BLOCK, DOCS, fill_page, filled, page_parser, table
 
 import merge_cosim as mc
 from merge_cosim.controllers.rollout import POLICIES, Rollout
@@ -89,6 +91,8 @@ STUDIES = {
     "ablations": Study(["designed-3"], ["interactive"], ABLATIONS),
     "front": Study(["designed-3"], ["interactive"], FRONT),
 }
+TOLD = "designed", "hidden", "replay"
+"""Studies that the page begins with."""
 WHOLE = [*STUDIES, "choice", "escapes", "losses"]
 
 
@@ -231,6 +235,34 @@ def losses(short: bool, data: Path | None) -> str | None:
     return table([*head, "last within narrowed bounds [s]", "failed [s]"], rows, left=3)
 
 
+def rows_of(page: str, name: str) -> list[dict[str, str]]:
+    """The table of a study on a page, by the names in its head."""
+    (block,) = (one[0] for one in BLOCK.finditer(page) if (one["kind"], one["argument"]) == ("proof", name))
+    head, _, *rows = [line.strip("| ").split(" | ") for line in block.splitlines() if line[:1] == "|"]
+    return [dict(zip(map(str.strip, head), map(str.strip, row), strict=True)) for row in rows]
+
+
+def in_short(page: str) -> str:
+    """What the tables of a page say about `interactive`, beside the method that estimates and fails or waits least."""
+    text = ""
+    for name in TOLD:
+        for scenario, rows in groupby(rows_of(page, name), lambda row: row["scenario"]):
+            ours, *others = sorted(rows, key=lambda row: row["method"] != "interactive")
+            others = [row for row in others if row["method"] in RIVALS]
+            fewest = min(others, key=lambda row: (_missed(row), float(row["delay [s]"])))
+            fastest = min(others, key=lambda row: float(row["delay [s]"]))
+            text += f"- {scenario}: {_missed(ours)} of {ours['n']} failed or stuck, mean delay {ours['delay [s]']} s. "
+            text += f"Fewest of the others: {fewest['method']} with {_missed(fewest)} of {fewest['n']} and "
+            text += (
+                f"{fewest['delay [s]']} s; least delay of the others: {fastest['delay [s]']} s ({fastest['method']}).\n"
+            )
+    return text
+
+
+def _missed(row: Mapping[str, str]) -> int:
+    return int(row["failed"]) + int(row["stuck"])
+
+
 def main(argv: Sequence[str] | None = None) -> None:
     """Fill the page's blocks."""
     parser = page_parser(__doc__)
@@ -250,6 +282,9 @@ def main(argv: Sequence[str] | None = None) -> None:
         "losses": lambda _: losses(given.short, given.data) if "losses" in wanted else None,
     }
     fill_page(PAGE, given.docs, kinds)
+    page = given.docs / PAGE
+    text = page.read_text(encoding="utf-8")
+    page.write_text(filled(text, {"short": lambda _: in_short(text)}), encoding="utf-8")
 
 
 if __name__ == "__main__":
