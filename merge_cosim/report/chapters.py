@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pandas as pd
@@ -105,6 +105,7 @@ def chapter(
     if beliefs is not None:
         found["belief"] = beliefs
     own = set(rows["case"])
+    title = _title(scenario["title"], section.site, section.source)
     outcome = page_data.outcome_rows(tables.of_section(summary, section), rows, verdict)
     data = {
         "rows": outcome,
@@ -116,13 +117,13 @@ def chapter(
     return Chapter(
         key=f"t{number}",
         section=section,
-        title=_title(scenario["title"], section.site, section.source),
+        title=title,
         source=SOURCES.get(section.source, section.source),
         about=" ".join(scenario["about"].split()),
         verdict=verdict,
         rows=outcome,
         notes=_notes(section, rows, scenario, manifest),
-        tables=found,
+        tables={name: replace(table, subject=title) for name, table in found.items()},
         data=data,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,20 +12,6 @@ from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 
 MISSING = "–"
-LATEX_SIGNS = {sign: f"\\{sign}" for sign in "&%$#_{}"} | {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "|": "$|$",
-    "<": "$<$",
-    "−": "$-$",
-    "–": "--",
-    "µ": r"$\mu$",
-    "≥": r"$\geq$",
-    "²": "$^2$",
-    "³": "$^3$",
-    ">": "$>$",
-}
 
 
 @dataclass(frozen=True)
@@ -40,6 +26,7 @@ class Column:
         prose: Sentences, set to the left and wrapped.
         range: Texts that are ranges of numbers.
         probability: A p value, never written as zero: `<0.001`.
+        paper: Shown in LaTeX, too, if no columns are chosen: a page is narrower than a screen.
     """
 
     name: str
@@ -50,6 +37,7 @@ class Column:
     better: int = 0
     range: bool = False
     probability: bool = False
+    paper: bool = True
 
     @property
     def is_text(self) -> bool:
@@ -77,12 +65,14 @@ class Table:
         columns: What is shown, in order; `data` holds all of them.
         apart: Rows of references, which follow after a rule.
         title: Caption.
+        subject: What it is about, for a caption that stands alone.
     """
 
     data: pd.DataFrame
     columns: tuple[Column, ...]
     apart: tuple[bool, ...]
     title: str
+    subject: str = ""
 
     @classmethod
     def of(cls, data: pd.DataFrame, columns: Sequence[Column], apart: Sequence[bool], title: str) -> Table:
@@ -131,33 +121,9 @@ class Table:
             if name not in known:
                 raise UserError(f"--columns: no column '{name}' in {self.title!r}{did_you_mean(name, list(known))}")
         kept = [self.columns[0], *(known[name] for name in names if name != self.columns[0].name)]
-        return replace(self, columns=tuple(kept), data=self.data[[column.name for column in kept]])
+        return self.with_columns(replace(column, paper=True) for column in kept)
 
-    def latex(self, label: str = "") -> str:
-        """The table in LaTeX with booktabs rules, best values in bold.
-
-        Args:
-            label: Name for cross-references; none, if empty.
-        """
-        keys = [(_escaped(column.group), _escaped(column.heading)) for column in self.columns]
-        cells = [
-            [f"\\textbf{{{_escaped(text)}}}" if bold else _escaped(text) for text, bold in zip(*row, strict=True)]
-            for row in zip(self.cells, self.best(), strict=True)
-        ]
-        grouped = any(column.group for column in self.columns)
-        headings = pd.MultiIndex.from_tuples(keys) if grouped else pd.Index([heading for _, heading in keys])
-        forms = {True: "p{0.3\\textwidth}", False: "l"}
-        text: str = pd.DataFrame(cells, columns=headings).to_latex(
-            index=False,
-            escape=False,
-            column_format="".join(forms[c.prose] if c.decimals is None else "r" for c in self.columns),
-            multicolumn_format="c",
-            caption=_escaped(self.title),
-            label=label or None,
-        )
-        return text
-
-
-def _escaped(text: str) -> str:
-    """Text with LaTeX's special characters escaped."""
-    return "".join(LATEX_SIGNS.get(sign, sign) for sign in text)
+    def with_columns(self, columns: Iterable[Column]) -> Table:
+        """The table with these of its columns."""
+        kept = tuple(columns)
+        return replace(self, columns=kept, data=self.data[[column.name for column in kept]])

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from merge_cosim.report.columns import Table
+from merge_cosim.report.latex import latex
 
 FOLDER = "tables"
 
@@ -25,7 +26,7 @@ def write_tables(folder: Path, tables: Mapping[str, Table]) -> list[Path]:
         stem = file_stem(name)
         csv, tex = target / f"{stem}.csv", target / f"{stem}.tex"
         table.data.to_csv(csv, index=False)
-        tex.write_text(table.latex(f"tab:{stem}"), encoding="utf-8")
+        tex.write_text(latex(table, f"tab:{stem}"), encoding="utf-8")
         files += [csv, tex]
     return files
 

@@ -1,6 +1,8 @@
 """The figures and tables that `report --figures` writes, and the marks of the best values."""
 
 import math
+import shutil
+import subprocess
 
 import pandas as pd
 import pytest
@@ -8,9 +10,12 @@ from matplotlib.transforms import Bbox
 
 from merge_cosim.report import canvas
 from merge_cosim.report.columns import Column, Table
+from merge_cosim.report.export import write_tables
 from merge_cosim.report.figures import FORMATS
+from merge_cosim.report.latex import latex
 from merge_cosim.report.methods import broken, looks
 from merge_cosim.report.outcome_figures import lines_figure, tradeoff_figure
+from merge_cosim.report.page import read_report
 from merge_cosim.results.store import ResultFolder
 
 
@@ -60,7 +65,7 @@ def test_an_unknown_column_is_one_line_and_status_2(command, swept, tmp_path, ca
 
 def test_text_means_nothing_to_latex():
     data = pd.DataFrame({"method": ["a_b & 5 %"], "x": [1.0]})
-    text = Table.of(data, [Column("method", "method"), Column("x", "x < 2", 1)], [False], "T_1").latex("tab:x")
+    text = latex(Table.of(data, [Column("method", "method"), Column("x", "x < 2", 1)], [False], "T_1"), "tab:x")
     assert r"a\_b \& 5 \% & 1.0" in text
     assert "x $<$ 2" in text
 
@@ -121,3 +126,15 @@ def test_no_point_of_a_variation_is_clipped(swept):
     figure = variation_figure(report.summary, "test.horizon", looks(report.results["method"]))
     highest = max(max(line.get_ydata()) for line in figure.axes[0].lines)
     assert highest < 0.95 * figure.axes[0].get_ylim()[1]
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="LaTeX is not installed")
+def test_latex_sets_every_table_within_the_line(swept, tmp_path):
+    files = sorted(file for file in write_tables(tmp_path, read_report(swept).tables) if file.suffix == ".tex")
+    page = [r"\documentclass{article}\usepackage{booktabs}\begin{document}"]
+    (tmp_path / "page.tex").write_text("\n".join([*page, *(rf"\input{{{file}}}" for file in files), r"\end{document}"]))
+    done = subprocess.run(
+        ["pdflatex", "-interaction=nonstopmode", "page.tex"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert len(files) > 3
+    assert "Overfull" not in done.stdout

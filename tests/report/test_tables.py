@@ -6,6 +6,7 @@ import pytest
 
 from merge_cosim.core.colors import rgba
 from merge_cosim.report.columns import Column, Table
+from merge_cosim.report.latex import latex
 from merge_cosim.report.methods import FAMILY_COLORS, KNOWN, in_order, looks
 from merge_cosim.report.published import published
 from merge_cosim.report.tables import Section, main_table, sections, strata_table, summary_frame, variation_table
@@ -90,7 +91,7 @@ def test_a_column_without_values_is_left_out():
         pd.DataFrame({"a": [1.0], "b": [None]}), [Column("a", "a", 0), Column("b", "b", 0)], [False], "T_1"
     )
     assert [column.name for column in table.columns] == ["a"]
-    assert r"\caption{T\_1}" in table.latex()
+    assert r"\caption{T\_1}" in latex(table)
 
 
 def test_published_figures():

@@ -56,7 +56,7 @@ def claims_table(evidence: Evidence) -> Table:
     for claim in CLAIMS:
         verdict = claim.judge(evidence)
         rows.append({"claim": claim.text, "paper": claim.paper, "verdict": verdict.word, "evidence": verdict.evidence})
-    columns = [Column("claim", "claim"), Column("paper", "paper"), Column("verdict", "verdict")]
+    columns = [Column("claim", "claim", prose=True), Column("paper", "paper"), Column("verdict", "verdict")]
     columns.append(Column("evidence", "evidence", prose=True))
     return Table.of(pd.DataFrame(rows), columns, [False] * len(rows), "The papers' claims and our verdict")
 
