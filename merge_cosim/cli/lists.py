@@ -50,6 +50,7 @@ def sensors(json: Json = False) -> None:
         print_json(rows)
     else:
         show_table([{"sensor": row["name"], "about": row["about"]} for row in rows], "")
+        typer.echo("merge-cosim methods NAME describes one; --set sensing.model=NAME uses it.")
 
 
 @app.command()
@@ -82,6 +83,8 @@ def models(json: Json = False) -> None:
         print_json(rows)
     else:
         show_table([{str(key).replace("train_", ""): value for key, value in row.items()} for row in rows], "")
+        typer.echo("Trained on so many pairs and merging cars. A sweep takes its source's model,")
+        typer.echo("or us101-ngsim-all where no real pair is tested. --model takes another.")
 
 
 @app.command()

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, cast
 
 import typer
 
-from merge_cosim import __doc__ as about
 from merge_cosim import __version__
 from merge_cosim.cli import lists, ngsim, ramp, results
 from merge_cosim.cli.interrupts import ended_by_signal
@@ -44,8 +43,13 @@ from merge_cosim.cli.show import (
 )
 from merge_cosim.core.errors import UserError
 
+ABOUT = """SUMO co-simulation of freeway on-ramp merging between an automated host and a human driver.
+
+To begin: merge-cosim sweep designed-2 --method acc,pgm --out out/first, then merge-cosim report out/first.
+"""
+
 app = typer.Typer(
-    help=about,
+    help=ABOUT,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,

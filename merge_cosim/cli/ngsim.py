@@ -25,7 +25,7 @@ Out = Annotated[Path, typer.Option("--out", help="Folder to write to.")]
 
 @app.command("import")
 def import_(files: Files, out: Out, site: OptionalSite = None, as_json: Json = False) -> None:
-    """Write trajectory files, NGSIM's or a site's own, as canonical Parquet, one file per site."""
+    """Write trajectory files as canonical Parquet, one per site."""
     from dataclasses import asdict
 
     from rich.console import Console
@@ -61,7 +61,10 @@ def download_(
     url: Annotated[str | None, typer.Option("--url", help="Another address than the portal's.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Fetch all NGSIM trajectories (about 1.4 GB) from the US Department of Transportation."""
+    """Fetch all NGSIM trajectories (about 1.4 GB).
+
+    They come from the US Department of Transportation.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, DownloadColumn, Progress, TimeRemainingColumn, TransferSpeedColumn
 
@@ -84,7 +87,10 @@ def summary(
     site: Annotated[str | None, typer.Option("--site", help=f"{A_SITE}; all shipped ones if not given.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Show the encounters that a data folder holds, beside the papers' Table I, and what was rejected."""
+    """Show the encounters in a data folder, and what was rejected.
+
+    Beside them stand the figures of the papers' Table I.
+    """
     from math import nan
 
     from rich.console import Console
@@ -133,7 +139,7 @@ def surrogate(
     site: Annotated[str | None, typer.Option("--site", help="Only the site of this shipped ramp.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Write synthetic trajectories, SUMO's own traffic, in NGSIM's format."""
+    """Write synthetic trajectories, made by SUMO, in NGSIM's format."""
     import pyarrow.parquet as pq
 
     from merge_cosim.ngsim.sites import site as find_site

@@ -73,7 +73,7 @@ def build_(which: Which, as_json: Json = False) -> None:
 
 @app.command("edit")
 def edit(which: Which) -> None:
-    """Open a ramp's plain XML sources in netedit, SUMO's editor, and wait until it is closed."""
+    """Open a ramp in netedit, SUMO's editor, until it is closed."""
     from merge_cosim.ramps.edit import open_editor
     from merge_cosim.ramps.ramp import find_ramp
 
@@ -112,7 +112,10 @@ def new(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Start a ramp of your own: from a few numbers, a SUMO net, or an extract of OpenStreetMap."""
+    """Start a ramp of your own: from numbers, a SUMO net or a map.
+
+    A map is an extract of OpenStreetMap.
+    """
     from merge_cosim.core.errors import UserError
     from merge_cosim.ramps.create.folder import NAME
     from merge_cosim.ramps.create.start import start_ramp
@@ -146,7 +149,10 @@ def describe(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write a ramp.toml beside a net of your own, so that its configurations run; the net is left as it is."""
+    """Write a ramp.toml beside a net of your own.
+
+    Then its configurations run; the net is left as it is.
+    """
     from merge_cosim.ramps.create.describe import describe_ramp
     from merge_cosim.ramps.create.start import found
     from merge_cosim.ramps.picture import PICTURE

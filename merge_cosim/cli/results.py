@@ -20,7 +20,15 @@ from merge_cosim.cli.options import (
     Wide,
     World,
 )
-from merge_cosim.cli.show import print_json, show_results, show_short_table, show_table, show_verification, verification
+from merge_cosim.cli.show import (
+    print_json,
+    show_results,
+    show_short_table,
+    show_table,
+    show_verdict,
+    show_verification,
+    verification,
+)
 from merge_cosim.core.errors import UserError
 
 app = typer.Typer()
@@ -80,7 +88,7 @@ def summary(
         from merge_cosim.report.short_table import short_tables
 
         for table in short_tables(folder):
-            typer.echo(f"{table.title}: {table.verdict}")
+            show_verdict(table)
     else:
         show_results(folder, wide, columns)
 

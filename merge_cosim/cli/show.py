@@ -91,9 +91,20 @@ def show_short_table(table: ShortTable) -> None:
     print_short_table(table, Console())
 
 
+def show_verdict(table: ShortTable) -> None:
+    """Print the verdict of a table: on a terminal in lines that fit it, else in one."""
+    from merge_cosim.report.text_table import wrapped
+
+    print(wrapped(f"{table.title}: {table.verdict}", _line_width()))
+
+
+def _line_width() -> int:
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+
+
 def show_story(lines: Sequence[str]) -> None:
     """Print what happened in a case; a line that is too long for the terminal goes on below its own text."""
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    width = _line_width()
     for line in lines:
         print("\n".join(textwrap.wrap(line, width, subsequent_indent=" " * 8, break_on_hyphens=False)))
 

@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.core.units import FloatArray, IntArray
-from merge_cosim.report.columns import Column, Table
+from merge_cosim.report.columns import MISSING, Column, Table
 from merge_cosim.report.comparison import MEASURES, SIDES
 from merge_cosim.report.traffic_table import traffic_table
 from merge_cosim.results.files import readable
@@ -159,7 +159,15 @@ def traffic_tables(path: Path, wide: bool = False) -> list[ShortTable]:
 def compared_tables(table: Table) -> list[ShortTable]:
     """What `comparison.compare` found, in 80 columns: one table per row where two methods were compared."""
     if "method" in table.data:
-        shown = [column for column in table.columns if column.name in COMPARED]
+        shown = [
+            replace(column, heading=f"{LINES[column.name[:-2]]}\n{column.name[-1].upper()}")
+            if column.name in ("failure_pct_a", "failure_pct_b")
+            else replace(column, heading=f"{column.group}\n{column.heading}")
+            if column.name.endswith("_difference")
+            else column
+            for column in table.columns
+            if column.name in COMPARED
+        ]
         return [
             _table(str(scenario), [], part.assign(variation=part.get("variation"), reference=False), shown)
             for scenario, part in table.data.groupby("scenario", sort=False)
@@ -183,10 +191,10 @@ def _beside(row: Mapping[Hashable, Any], columns: Sequence[Column]) -> ShortTabl
         (few, less), (many, more) = sorted(((only_a, "A"), (only_b, "B")))
         cases = f"{many:,} case{'s' * (many > 1)}"
         verdict = f"{less} fails less: {cases} under {more} alone, {few or 'none'} under {less} alone."
-    if "p" in text:
+    if text.get("p", MISSING) != MISSING:
         test = f"Exact test, a car's cases kept together: p = {text['p']}.".replace("= <", "< ")
         verdict = f"{verdict} {test}"
-    used = [place for place in range(len(sides)) if any(cells_of[place] for cells_of in cells)]
+    used = [place for place in range(len(sides)) if any(line[place] not in ("", MISSING) for line in cells)]
     shown = [[line[place] for place in used] for line in cells]
     title = f"{', '.join(names)}: {text['n']} common cases"
     return ShortTable(title, tuple(sides[place] for place in used), shown, len(cells), frozenset(), verdict)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Sequence
 from typing import Literal
 
@@ -41,13 +42,20 @@ def print_short_table(table: ShortTable, console: Console) -> None:
     notes = ["* best of its column"] * bool(table.best)
     notes += ["below the rule: references"] * (0 < table.methods < len(table.cells))
     console.print(Text("; ".join(notes), style="dim"), end="\n" if notes else "")
-    console.print(Text(table.verdict), end="\n\n" if table.verdict else "\n")
+    console.print(Text(wrapped(table.verdict, width)), end="\n\n" if table.verdict else "\n", soft_wrap=True)
+
+
+def wrapped(text: str, width: int) -> str:
+    """Text in lines of a width, a number never parted from its per cent sign."""
+    return textwrap.fill(text.replace(" %", "\xa0%"), width, break_on_hyphens=False).replace("\xa0", " ")
 
 
 def _drawn(table: ShortTable, cells: Sequence[Sequence[str]]) -> Table:
     drawn = Table(box=HORIZONTALS)
     for column in table.columns:
-        heading = column.heading.replace(" ", "\n") if len(column.heading) > LEAST_TEXT else column.heading
+        heading = column.heading
+        if max(map(len, heading.split("\n"))) > LEAST_TEXT:
+            heading = heading.replace(" ", "\n")
         side: Literal["left", "right"] = "left" if column.is_text else "right"
         drawn.add_column(heading, justify=side, no_wrap=not column.is_text, overflow="fold")
     marked = {place for _, place in table.best}
