@@ -8,17 +8,26 @@ each part of the core, with the share killed and its 95 % interval (Wilson).
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import random
 import shutil
-import sqlite3
-import subprocess
+import signal
 import sys
 import tempfile
 from pathlib import Path
 
-from merge_cosim.results.statistics.rates import wilson
+import hypothesis  # noqa: F401  what takes long to import is here once, for all mutants
+import pandas as pd  # noqa: F401
+import pyarrow.parquet as pq  # noqa: F401
+import pytest
+import scipy.stats  # noqa: F401
+import sklearn.mixture  # noqa: F401
+from cosmic_ray.commands import init
+from cosmic_ray.mutating import use_mutation
+from cosmic_ray.plugins import get_operator
+from cosmic_ray.work_db import use_db
 
 CORE = {
     "scoring": (
@@ -35,47 +44,54 @@ CORE = {
     ),
     "loop": (
         ["simulation/loop.py", "simulation/leader.py", "simulation/host_driver.py"],
-        [f"simulation/test_{name}.py" for name in ("leader", "host_driver", "loop")],
+        [f"simulation/test_{name}.py" for name in ("leader", "host_driver", "loop_records", "loop")],
     ),
 }
 """Modules of each part, and the tests that must kill their mutants."""
 
-CONFIG = """[cosmic-ray]
-module-path = {modules}
-timeout = 240.0
-excluded-modules = []
-test-command = "{python} -m pytest -x -q -p no:cacheprovider {tests}"
-[cosmic-ray.distributor]
-name = "local"
-"""
+LIMIT = 240
+"""Longest time for the tests of one mutant [s]; a mutant that needs more is killed."""
 
 
-def score(part: str, sample: int, seed: int, copy: Path) -> dict[str, object]:
-    """Run a sample of the mutants of one part."""
+def score(part: str, sample: int, seed: int) -> dict[str, object]:
+    """Run a sample of the mutants of one part, in a copy of the repository, which is the current folder."""
     modules, tests = CORE[part]
-    session, config = copy / f"{part}.sqlite", copy / f"{part}.toml"
-    places = json.dumps([f"merge_cosim/{module}" for module in modules])
-    files = " ".join(f"tests/{test}" for test in tests)
-    config.write_text(CONFIG.format(modules=places, tests=files, python=sys.executable))
-    run, own = [sys.executable, "-m", "cosmic_ray.cli"], os.environ | {"PYTHONPATH": str(copy)}
-    subprocess.run([*run, "init", str(config), str(session)], cwd=copy, env=own, check=True)
-    with sqlite3.connect(session) as base:
-        every = base.execute("select job_id, module_path, operator_name, start_pos_row from mutation_specs").fetchall()
-        meant = sorted(one for one in every if _meant(copy / one[1], one[3]))
-        chosen = random.Random(f"{seed} {part}").sample(meant, min(sample, len(meant)))
-        kept = {one[0] for one in chosen}
-        for table in ("mutation_specs", "work_items"):
-            base.executemany(
-                f"delete from {table} where job_id = ?", [(one[0],) for one in every if one[0] not in kept]
-            )
-    subprocess.run([*run, "exec", str(config), str(session)], cwd=copy, env=own, check=True)
-    with sqlite3.connect(session) as base:
-        rows = base.execute(
-            "select m.module_path, m.start_pos_row, m.operator_name, r.test_outcome from mutation_specs m "
-            "join work_results r on r.job_id = m.job_id"
-        ).fetchall()
-    survived = sorted(f"{module}:{line} {operator}" for module, line, operator, end in rows if "SURVIVED" in str(end))
-    return {"mutants": len(meant), "run": len(rows), "killed": len(rows) - len(survived), "survived": survived}
+    with use_db(f"{part}.sqlite") as base:
+        init([Path("merge_cosim") / module for module in modules], base, {})
+        every = [one.mutations[0] for one in base.work_items]
+    meant = sorted(
+        (one for one in every if _meant(Path(one.module_path), one.start_pos[0])),
+        key=lambda one: (str(one.module_path), one.operator_name, one.occurrence),
+    )
+    chosen = random.Random(f"{seed} {part}").sample(meant, min(sample, len(meant)))
+    files = [f"tests/{test}" for test in tests]
+    if not _passes(files):
+        raise SystemExit(f"{part}: the tests fail without any change")
+    survived = []
+    for number, one in enumerate(chosen):
+        with use_mutation(one.module_path, get_operator(one.operator_name)(), one.occurrence) as (code, mutated):
+            os.utime(one.module_path, (number, number))  # no two mutants share what Python has compiled
+            if _passes(files):
+                line = next(new for old, new in zip(code.split("\n"), mutated.split("\n"), strict=False) if old != new)
+                survived.append(f"{one.module_path}:{one.start_pos[0]}: {line.strip()}")
+    run = len(chosen)
+    return {"mutants": len(meant), "run": run, "killed": run - len(survived), "survived": sorted(survived)}
+
+
+def _passes(files: list[str]) -> bool:
+    """Whether tests pass, in a process of their own that has the large libraries loaded, but not the package."""
+    child = os.fork()
+    if not child:
+        os.setsid()
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, 1)
+        os.dup2(nothing, 2)
+        signal.alarm(LIMIT)
+        os._exit(pytest.main(["-x", "-q", "-p", "no:cacheprovider", *files]))
+    _, status = os.waitpid(child, 0)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    return status == 0
 
 
 def _meant(module: Path, line: int) -> bool:
@@ -95,11 +111,15 @@ def main() -> None:
     found = {}
     with tempfile.TemporaryDirectory() as scratch:
         copy = Path(scratch) / "copy"
-        ignored = shutil.ignore_patterns(".git", ".venv", "out", "*.sqlite", "__pycache__", ".hypothesis")
+        ignored = shutil.ignore_patterns(".*", "out", "*.sqlite", "__pycache__")
         shutil.copytree(Path(__file__).parents[1], copy, ignore=ignored)
+        os.chdir(copy)
+        sys.path.insert(0, str(copy))
+        os.environ |= {"PYTHONPATH": str(copy), "MERGE_COSIM_CACHE": str(Path(scratch) / "cache")}
         for part in parts:
-            found[part] = score(part, given.sample, given.seed, copy)
+            found[part] = score(part, given.sample, given.seed)
             print(json.dumps({part: found[part]}), file=sys.stderr, flush=True)
+        from merge_cosim.results.statistics.rates import wilson  # not before: each mutant loads the package anew
     killed, run = (sum(int(str(one[name])) for one in found.values()) for name in ("killed", "run"))
     interval = [round(float(end), 1) for end in wilson(killed, run)]
     print(
