@@ -49,7 +49,8 @@ def plain(encounters: Encounters, number: int, estimator, rules: Rules) -> dict[
     car.reset(first, first)
     exact, lengths, until = one.start[:4, 0].copy(), one.start[4:], NEVER
     found = {name: [] for name in ("state", "log_odds", "command")}
-    for cycle in count():
+    cycle = 0
+    while True:
         state = exact.round(6)
         now = Observation(*state[[0, 2, 1, 3], None], *lengths)
         found["state"].append(state)
@@ -64,6 +65,7 @@ def plain(encounters: Encounters, number: int, estimator, rules: Rules) -> dict[
         found["command"].append(speed)
         exact[2:] = speed, car.next_speed(np.array([cycle]), now)[0]
         exact[:2] += exact[2:] * 0.1
+        cycle += 1
 
 
 def run(encounters, slots, estimator=AlwaysGo, controller=Acc, traced=(), rules=RULES):
