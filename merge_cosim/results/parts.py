@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -70,6 +71,13 @@ class Parts:
         for file in [*self._path.glob("*.parquet"), self._plan]:
             file.unlink()
         self._path.rmdir()
+
+    def finish_if_empty(self) -> None:
+        """The same where no part is stored; what held nothing but the parts goes, too."""
+        if not any(self._path.glob("*.parquet")):
+            with suppress(OSError):  # it is read-only, or something else is there
+                self.finish()
+                self._path.parent.rmdir()
 
     def done(self) -> set[str]:
         """Names of the batches whose parts are there, and can be read."""

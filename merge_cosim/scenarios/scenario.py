@@ -220,6 +220,7 @@ def _of_toml(file: Path) -> dict[str, Any]:
 
 def _of_sumocfg(file: Path) -> dict[str, Any]:
     configuration = Configuration.read(file)
+    configuration.note_step()
     folder = configuration.net.parent
     if str(folder) in ramp_names():  # a folder of one's own by a shipped ramp's name
         folder = folder.absolute()

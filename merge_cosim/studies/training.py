@@ -20,6 +20,8 @@ from merge_cosim.scenarios.sources import Pairs
 from merge_cosim.studies.judging import density_losses, judge
 
 Split = Literal["car", "pair"]
+MOST_MODELS = 1_000
+"""Most models of one training."""
 
 
 def train(
@@ -95,10 +97,15 @@ def train_ensemble(
         One row per model: file, pairs and cars.
 
     Raises:
-        UserError: See `train`; or neither or both numbers are given, or there are fewer cars than folds.
+        UserError: See `train`; or neither or both numbers are given, or too many, or there are fewer cars than folds.
     """
     if (splits > 0) == (folds > 0):
         raise UserError("train: give --splits K or --folds K, not both")
+    if max(splits, folds) > MOST_MODELS:
+        raise UserError(
+            f"train --{'splits' if splits else 'folds'} {max(splits, folds)}: no more than {MOST_MODELS} models, each of "
+            "which takes about a second"
+        )
     encounters, settings = _pairs(site, data, source, "car", seed)
     out.mkdir(parents=True, exist_ok=True)
     rows = []

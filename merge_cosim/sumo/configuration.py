@@ -16,6 +16,7 @@ from lxml import etree
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.programs import run_program
 from merge_cosim.core.registry import did_you_mean
+from merge_cosim.core.units import DT, TOLERANCE
 from merge_cosim.core.xml_file import read_xml
 from merge_cosim.ramps.create.describe import describe_ramp
 from merge_cosim.ramps.definition import FILE_NAME, read_ramp_file
@@ -43,6 +44,7 @@ class Configuration:
         additional: Its additional files.
         begin: Its begin [s].
         end: Its end [s]; inf if it names none.
+        step: Its step [s]; `DT` if it names none. What is run has steps of `DT` all the same.
     """
 
     file: Path
@@ -51,6 +53,7 @@ class Configuration:
     additional: tuple[Path, ...]
     begin: float
     end: float
+    step: float
 
     @classmethod
     def read(cls, file: Path) -> Configuration:
@@ -76,11 +79,17 @@ class Configuration:
             if not each.is_file():
                 raise UserError(f"{file}: {each}: no such file")
         _require_ramp(file, nets[0])
-        _seconds(options.get("step-length", "1"), file)
+        step = _seconds(options.get("step-length", repr(DT)), file)
         end = _seconds(options.get("end", "-1"), file)
         return cls(
-            file, nets[0], routes, additional, _seconds(options.get("begin", "0"), file), end if end >= 0 else math.inf
+            *(file, nets[0], routes, additional, _seconds(options.get("begin", "0"), file)),
+            *(end if end >= 0 else math.inf, step),
         )
+
+    def note_step(self) -> None:
+        """Say, on standard error, that another step than `DT` is not taken."""
+        if abs(self.step - DT) > TOLERANCE:
+            print(f"{self.file}: step-length {self.step:g} s is not used: a cycle is {DT:g} s", file=sys.stderr)
 
     @property
     def files(self) -> tuple[Path, ...]:

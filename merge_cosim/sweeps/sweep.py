@@ -133,12 +133,16 @@ def sweep(
         progress(0, sum(map(len, tasks)), forecast(tasks, request.jobs))
     chunks, done = list(cut(tasks)), folder.parts.done()
     queue = ChunkQueue(chunk for chunk in chunks if chunk.name not in done)
-    with closing(executor_for(request, len(queue))) as executor:
-        tally = _run(executor, queue, chunks, folder, progress)
-        ran = perf_counter()
-        folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
-        folder.traces.begin(keep=add)
-        record(request, every, folder, earlier.recorded, executor, progress)
+    try:
+        with closing(executor_for(request, len(queue))) as executor:
+            tally = _run(executor, queue, chunks, folder, progress)
+            ran = perf_counter()
+            folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
+            folder.traces.begin(keep=add)
+            record(request, every, folder, earlier.recorded, executor, progress)
+    except Exception:
+        folder.parts.finish_if_empty()  # nothing was run: there is nothing to resume
+        raise
     scenes = folder.parts.scenes()
     _sum_up(tasks, folder, scenes, tally, reference_of(what["methods"], what["against"]), earlier)
     effort, run_s = tally.effort, ran - planned

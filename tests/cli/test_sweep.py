@@ -328,6 +328,34 @@ def test_a_plugin_that_breaks_is_named(tmp_path):
     assert done.stderr.endswith("broken.py, line 1, in <module>: 1 / 0: ZeroDivisionError: division by zero\n")
 
 
+HERE = ("--world", "closed-form", "--out", "out")
+LATE = """
+import merge_cosim as mc
+
+
+@mc.estimator
+class Late(mc.Estimator):
+    name = "late"
+
+    def update(self, seen):
+        raise OSError(28, "No space left on device") if {full} else ValueError("too late")
+"""
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_a_sweep_that_ran_no_case_leaves_nothing_unfinished(tmp_path, full):
+    small_scenario(tmp_path)
+    (tmp_path / "late.py").write_text(LATE.format(full=full))
+    done = merge_cosim("sweep", "small.toml", "--method", "late", *HERE, "--plugin", "late.py", cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert not (tmp_path / "out").exists()
+    assert merge_cosim("sweep", "small.toml", "--method", "acc", *HERE, cwd=tmp_path).returncode == 0
+    before = sorted(file.name for file in (tmp_path / "out").iterdir())
+    again = ("sweep", "small.toml", "--method", "late", *HERE, "--plugin", "late.py", "--overwrite")
+    assert merge_cosim(*again, cwd=tmp_path).returncode == 2
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == before
+
+
 def test_help_lists_and_cache(tmp_path):
     assert "sweep" in merge_cosim("--help", cwd=tmp_path).stdout
     scenarios = json.loads(merge_cosim("scenarios", "--json", cwd=tmp_path).stdout)

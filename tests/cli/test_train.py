@@ -52,7 +52,12 @@ def test_every_pair_is_tested_by_the_model_that_has_not_seen_its_car(tmp_path, d
 
 def test_wrong_numbers_of_models_are_one_line(tmp_path, data_dir):
     how = ("train", "--data", data_dir, "--source", "ngsim", "--out", "models")
-    for numbers, expected in ((("--splits", 2, "--folds", 2), "not both"), (("--folds", 99), "99 folds of 58 merging")):
+    for numbers, expected in (
+        (("--splits", 2, "--folds", 2), "not both"),
+        (("--folds", 99), "99 folds of 58 merging"),
+        (("--splits", 100_000), "train --splits 100000: no more than 1000 models"),
+        (("--folds", 1001), "train --folds 1001: no more than 1000 models"),
+    ):
         done = merge_cosim(*how, *numbers, cwd=tmp_path)
         assert done.returncode == 2
         assert expected in done.stderr

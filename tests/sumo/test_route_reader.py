@@ -13,6 +13,7 @@ from merge_cosim.core.files import cache_folder, from_cache
 from merge_cosim.ramps.build import build
 from merge_cosim.ramps.create.new import RampNumbers, new_ramp
 from merge_cosim.ramps.ramp import Ramp
+from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.sumo.configuration import Configuration
 from merge_cosim.sumo.route_reader import only_pairs, read_sumocfg
 from merge_cosim.sumo.routes import write_encounter
@@ -148,6 +149,13 @@ def test_mistakes_in_the_configuration_are_named(tmp_path, old, new, expected):
     assert old in CONFIG
     with pytest.raises(UserError, match=expected):
         read_sumocfg(write(tmp_path, config=CONFIG.replace(old, new)))
+
+
+@pytest.mark.parametrize(("step", "said"), [("0.25", "step-length 0.25 s is not used: a cycle is 0.1 s"), ("0.1", "")])
+def test_another_step_is_not_taken_silently(tmp_path, step, said, capsys):
+    file = write(tmp_path, config=CONFIG.replace("</input>", f'<step-length value="{step}"/></input>'))
+    load_scenario(file)
+    assert capsys.readouterr().err == (f"{file}: {said}\n" if said else "")
 
 
 def test_document_types_and_circles_in_further_files(tmp_path):
