@@ -9,8 +9,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import IO, TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
+STDERR = 2
+"""Number of a process's standard error."""
 SAME = 1.0
 """Interrupts within this time are one [s]: both the terminal and a program around this one may send it."""
 LATER = 0.02
@@ -81,10 +86,36 @@ def interrupts_ignored(*blocked: signal.Signals) -> Iterator[None]:
         return
     from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # it would be started with the first process, and unblock the signal there
+    with open(os.devnull, "wb") as nothing, starts_silently(nothing):
+        resource_tracker.ensure_running()  # it would be started with the first process, and unblock the signal there
     with held_back(signal.SIGINT, *blocked):  # for threads without the mask
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *blocked})
         try:
             yield
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def starts_silently(file: IO[bytes]) -> Iterator[Connection | None]:
+    """Processes that are started here print to a file on standard error, as where they lack memory for their start.
+
+    Args:
+        file: The file.
+
+    Yields:
+        This process's own standard error, to be given to a process, which can then turn to it; None on Windows.
+    """
+    if os.name != "posix":
+        yield None
+        return
+    from multiprocessing.connection import Connection
+
+    own = os.dup(STDERR)
+    try:
+        os.dup2(file.fileno(), STDERR)
+        with Connection(os.dup(own), readable=False) as connection:
+            yield connection
+    finally:
+        os.dup2(own, STDERR)
+        os.close(own)

@@ -103,8 +103,8 @@ def train_ensemble(
         raise UserError("train: give --splits K or --folds K, not both")
     if max(splits, folds) > MOST_MODELS:
         raise UserError(
-            f"train --{'splits' if splits else 'folds'} {max(splits, folds)}: no more than {MOST_MODELS} models, each of "
-            "which takes about a second"
+            f"train --{'splits' if splits else 'folds'} {max(splits, folds)}: no more than {MOST_MODELS} models, each "
+            "of which takes about a second"
         )
     encounters, settings = _pairs(site, data, source, "car", seed)
     out.mkdir(parents=True, exist_ok=True)

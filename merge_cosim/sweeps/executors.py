@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import tempfile
 import threading
 import traceback
 from collections import Counter
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import load_plugin
-from merge_cosim.core.signals import interrupts_ignored
+from merge_cosim.core.signals import STDERR, interrupts_ignored, starts_silently
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, Finished
 from merge_cosim.sweeps.shipping import dumps, main_hidden, pack, unpack
 from merge_cosim.sweeps.worker_session import WorkerSession
@@ -145,12 +146,24 @@ class _Worker:
         self.chunk: Chunk | None = None
         forked = context.get_start_method() == "fork"
         inherited = self.connection if forked else None
-        self.process: Any = context.Process(  # type: ignore[attr-defined]
-            target=_serve, args=(there, inherited, plugins), name="merge-cosim worker", daemon=True
-        )
-        with interrupts_ignored(signal.SIGTERM), main_hidden():
-            self.process.start()
+        with tempfile.TemporaryFile() as said, starts_silently(said) as errors:
+            self._said = os.dup(said.fileno())
+            self.process: Any = context.Process(  # type: ignore[attr-defined]
+                target=_serve, args=(there, inherited, errors, plugins), name="merge-cosim worker", daemon=True
+            )
+            with interrupts_ignored(signal.SIGTERM), main_hidden():
+                self.process.start()
         there.close()
+
+    def end(self) -> str:
+        """How the process ended by itself, and the last line that it printed while it started."""
+        self.process.join()
+        code = self.process.exitcode
+        with open(self._said, errors="replace") as said:
+            said.seek(0)
+            lines = said.read().splitlines()
+        why = f": {lines[-1]}" if lines else ""
+        return (f"by signal {-code}" if code < 0 else f"with status {code}") + why
 
     def begin(self, chunk: Chunk | None) -> None:
         self.chunk = chunk
@@ -167,11 +180,17 @@ class _Worker:
             with suppress(OSError):
                 self.connection.send_bytes(b"")
         self.connection.close()
+        os.close(self._said)
         self.process.join()
 
 
-def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path, ...]) -> None:
+def _serve(
+    parent: Connection, inherited: Connection | None, errors: Connection | None, plugins: tuple[Path, ...]
+) -> None:
     """What a worker process does: run what comes through the pipe, until that is empty or closed."""
+    if errors is not None:
+        os.dup2(errors.fileno(), STDERR)
+        errors.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process gets it, too, and ends the workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
@@ -192,7 +211,7 @@ def _serve(parent: Connection, inherited: Connection | None, plugins: tuple[Path
                     error.add_note(f"In a worker process:\n{traceback.format_exc()}")
                 outcome = error
             parent.send_bytes(dumps(outcome))  # an error's class may be one of the user's
-    except (EOFError, OSError):  # the parent process was killed
+    except (EOFError, OSError, MemoryError):  # the parent process was killed, or an outcome has no room
         pass
     finally:
         worker_session.close()
@@ -213,10 +232,7 @@ def _end_with_parent() -> None:
 
 
 def _lost(chunk: Chunk, worker: _Worker) -> str:
-    worker.process.join()
-    code = worker.process.exitcode
-    end = f"by signal {-code}" if code < 0 else f"with status {code}"
     return (
-        f"{chunk}: {MOST_LOSSES} worker processes in a row died while running these cases, the last one {end} "
+        f"{chunk}: {MOST_LOSSES} worker processes in a row died while running these cases, the last one {worker.end()} "
         f"(9: killed, as for want of memory); what was finished is kept, go on with --resume, perhaps with fewer --jobs"
     )

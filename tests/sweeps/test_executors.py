@@ -1,5 +1,6 @@
 """Executors: every one gives the same rows, and a killed worker costs no more than its chunk."""
 
+import multiprocessing.spawn
 import os
 import signal
 import subprocess
@@ -180,6 +181,24 @@ def test_a_worker_that_is_ended_while_it_starts_ends_without_a_traceback():
     done = subprocess.run([sys.executable, "-c", ENDED_AT_ONCE], capture_output=True, text=True, check=False)
     assert "3 worker processes in a row died while running these cases, the last one by signal 15" in done.stdout
     assert done.stderr == ""
+
+
+def test_an_interpreter_that_cannot_start_is_one_line(tmp_path, monkeypatch, capfd):
+    program = tmp_path / "python"
+    program.write_text("#!/bin/sh\nprintf 'Traceback (most recent call last):\\n  File\\nMemoryError\\n' >&2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(multiprocessing.spawn, "_python_exe", os.fsencode(program))
+    with pytest.raises(UserError, match=r"3 worker processes .*, the last one with status 1: MemoryError \(9: killed"):
+        list(Processes(2).run(ChunkQueue(chunks())))
+    os.write(2, b"here")
+    assert capfd.readouterr().err == "here"  # nothing else, and standard error is what it was
+
+
+def test_a_worker_prints_on_the_standard_error_of_its_parent(tmp_path, own_registry, capfd):
+    plugin = tmp_path / "loud.py"
+    plugin.write_text("import os, multiprocessing\nif multiprocessing.parent_process(): os.write(2, b'of a worker')\n")
+    list(Processes(1, [plugin]).run(ChunkQueue(chunks(["always-go"], 120))))
+    assert capfd.readouterr().err == "of a worker"
 
 
 def test_a_piece_that_kills_every_worker_ends_the_sweep_with_a_clear_line(tmp_path, own_registry):
