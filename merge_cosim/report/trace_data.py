@@ -109,7 +109,7 @@ def _outcome(rows: pd.DataFrame, key: tuple[Any, ...]) -> dict[str, Any]:
         return {"failed": False, "outcome": "recorded"}
     row = rows.loc[key]
     outcome = next((name for name in ("failed", "stuck", "censored") if bool(row[name])), "passed")
-    kind = f" ({row['failure_kind'].replace('_', ' ')})" if row["failure_kind"] else ""
+    kind = f" ({row['failure_kind'].replace('_', ' ').replace('side', 'side by side')})" if row["failure_kind"] else ""
     return {
         "failed": bool(row["failed"]),
         "outcome": outcome + kind,

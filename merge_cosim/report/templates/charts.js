@@ -61,6 +61,7 @@ function placeLabel(f, dot, most = 99) {
     }
   }
   if (!best) return most > 12 ? placeLabel(f, dot, 12) : undefined;
+  if (row.reference && best.cost > 400) return;
   f.boxes.push(best.box);
   if (best.reach > 22) {
     const end = [clamp(dot.x, best.box[0], best.box[2]), clamp(dot.y, best.box[1] + 3, best.box[3] - 3)];

@@ -151,6 +151,7 @@ function delayDots(element, data) {
   const xs = methods.flatMap((method) => data.methods[method].x);
   const ys = methods.filter((method) => !METHODS[method].reference || methods.length < 3).flatMap((method) => data.methods[method].y.filter((value) => value !== null));
   const right = Math.max(quantile(xs, 0.95), data.edges.at(-1)) * 1.1, topEnd = Math.max(quantile(ys, 0.95) * 1.15, 1), low = Math.min(0, quantile(ys, 0.01));
+  const most = Math.max(...methods.map((method) => data.methods[method].x.length)), size = clamp(5 - Math.log10(most), 2.2, 4);
   panels(element, methods, (method, canvas, width) => {
     const left = 36, bottom = 30, height = Math.round(Math.min(width, 300)), pen = prepared(canvas, width, height), own = data.methods[method];
     const sx = scale(0, right, left, width - 6), sy = scale(low, topEnd, height - bottom, 8);
@@ -171,9 +172,9 @@ function delayDots(element, data) {
       if (own.failed[i] || own.y[i] === null) return;
       const beyond = value > right || own.y[i] > topEnd, x = sx(Math.min(value, right)), y = sy(clamp(own.y[i], low, topEnd));
       pen.fillStyle = dot;
-      pen.globalAlpha = 0.45;
+      pen.globalAlpha = most > 100 ? 0.45 : 0.75;
       pen.beginPath();
-      if (beyond) { pen.moveTo(x, y - 4); pen.lineTo(x + 4, y + 3); pen.lineTo(x - 4, y + 3); } else pen.arc(x, y, 2.2, 0, 7);
+      if (beyond) { pen.moveTo(x, y - 4); pen.lineTo(x + 4, y + 3); pen.lineTo(x - 4, y + 3); } else pen.arc(x, y, size, 0, 7);
       pen.fill();
     });
     pen.globalAlpha = 1;
