@@ -36,7 +36,7 @@ CORE = {
     ),
     "statistics": (
         ["results/statistics/rates.py", "results/statistics/verdict.py", "results/statistics/summary.py"],
-        [f"results/test_{name}.py" for name in ("statistics", "summaries", "verdict")],
+        [f"results/test_{name}.py" for name in ("summary_second_reading", "verdict", "statistics", "summaries")],
     ),
     "readers": (
         ["ngsim/clean.py", "ngsim/formats.py", "ngsim/table.py", "ngsim/rows.py", "ngsim/resample.py"],

@@ -321,7 +321,12 @@ def _constant_part(condition: str) -> bool:
             pieces.append([one.operand])
         elif isinstance(one, ast.Compare):
             pieces += map(list, pairwise([one.left, *one.comparators]))
-    return not all(any(isinstance(part, ast.Name) for one in piece for part in ast.walk(one)) for piece in pieces)
+    return not all(any(_is_column(part) for one in piece for part in ast.walk(one)) for piece in pieces)
+
+
+def _is_column(part: ast.AST) -> bool:
+    """Whether it is a name that pandas does not know by itself."""
+    return isinstance(part, ast.Name) and part.id not in ("inf", "Inf", "datetime", "Timestamp", "list", "tuple")
 
 
 def _columns_in(condition: str) -> list[str]:

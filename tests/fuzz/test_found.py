@@ -214,7 +214,7 @@ def test_a_condition_with_a_part_of_constants(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(GRID)
     words = ("--method", "acc", "--world", "closed-form", "--jobs", 1, "--out", "out")
     assert merge_cosim("sweep", "s.toml", *words, cwd=tmp_path).returncode == 0
-    for condition in ("stuck | (not -1 != 'x')", "method == 'acc' == 'acc'"):
+    for condition in ("stuck | (not -1 != 'x')", "method == 'acc' == 'acc'", "stuck | (not inf > 18.0)"):
         line = refused("cases", "out", "--where", condition, cwd=tmp_path)
         assert "a part of it names no column; write one such as" in line
     assert merge_cosim("cases", "out", "--where", "0 <= delay_s < 5", cwd=tmp_path).returncode == 0
