@@ -111,7 +111,7 @@ def text_rows(content: bytes, names: tuple[str, ...] | None) -> Iterator[dict[st
     """The rows of a text; `names` of the columns where it has no header, and then blanks separate them, or commas."""
     lines = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     comma = "," in lines[0]
-    parted = csv.reader(lines) if comma else (line.split() for line in lines)
+    parted = csv.reader(lines) if comma else (re.findall(r"[^ \t\v\f]+", line) for line in lines)
     parted = (fields for fields in parted if fields)
     header = [name.strip().lower() for name in (names or next(parted))]
     for fields in parted:

@@ -1,5 +1,8 @@
 """Cells and columns of NGSIM files, one by one; tests/ngsim/test_read.py reads whole files."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -8,7 +11,7 @@ from ngsim_files import car, write_csv
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import FOOT
 from merge_cosim.ngsim.clean import Place, checked, numbers
-from merge_cosim.ngsim.formats import sources
+from merge_cosim.ngsim.formats import LIMITS, WIDE, sources
 from merge_cosim.ngsim.rows import needed_columns
 from merge_cosim.ngsim.sites import site
 
@@ -35,6 +38,37 @@ def test_a_cell_that_is_no_number_is_named_with_its_line(place):
         checked(column(1.0, 2.0, 2.5), "Lane_ID", "lane", place)
     with pytest.raises(UserError, match=r"line 2: v_Vel is .*, impossible: outside"):
         checked(column(-1e6, 0.0, 0.0), "v_Vel", "speed", place)
+
+
+@pytest.mark.parametrize(
+    ("limits", "name", "low", "high"),
+    [
+        (LIMITS, "vehicle_id", -100_000_000, 100_000_000),
+        (LIMITS, "part", 0, 10_000),
+        (LIMITS, "frame", 0, 100_000_000),
+        (LIMITS, "time", 0, 100_000_000),
+        (LIMITS, "x", -50, 100),
+        (LIMITS, "y", -100, 1000),
+        (LIMITS, "speed", -1, 100),
+        (LIMITS, "length", 0, 50),
+        (LIMITS, "width", 0, 10),
+        (LIMITS, "lane", 0, 20),
+        (WIDE, "x", -1_000_000, 1_000_000),
+        (WIDE, "y", -1_000_000, 1_000_000),
+        (WIDE, "lane", -32_768, 32_767),
+        (WIDE, "speed", -1, 100),
+    ],
+)
+def test_the_least_and_the_largest_value_are_possible_and_no_more(place, limits, name, low, high):
+    layout = replace(place.source.layout, unit=1.0, limits=limits)
+    here = Place(replace(place.source, layout=layout), place.rows)
+    least = np.nan if name in ("length", "width") else low  # not logged
+    np.testing.assert_array_equal(checked(column(low, high), "c", name, here), [least, high])
+    for wrong in (low - 1, high + 1):
+        with pytest.raises(
+            UserError, match=re.escape(f"line 3: c is {wrong}, impossible: outside {low:g} to {high:g}")
+        ):
+            checked(column(low, wrong), "c", name, here)
 
 
 def test_values_are_in_si_units_and_missing_lengths_are_nan(place):

@@ -97,6 +97,13 @@ def test_the_original_and_the_imported_file_give_the_same_encounters(tmp_path: P
     assert len(strict) == 0
 
 
+def test_a_file_without_a_recording_is_one(tmp_path: Path) -> None:
+    (tmp_path / "merge").mkdir()
+    (tmp_path / "merge" / "site.toml").write_text(SITE.replace('recording = "film"\n', ""))
+    table = read_file(write(tmp_path / "one.parquet"), site(tmp_path / "merge")).tables["merge"]
+    assert table["recording"].to_pylist() == ["one"] * 162
+
+
 def test_mistakes_in_the_recording_are_named(tmp_path: Path, own: Site) -> None:
     with pytest.raises(UserError, match=r"a\.parquet, row 2: v is -9\.0, impossible: outside -3\.28084 to 328\.084"):
         read_file(write(tmp_path / "a.parquet", v=[40.0, -9.0, *[40.0] * 80]), own)

@@ -33,6 +33,16 @@ def test_a_part_between_two_instants_is_left_out() -> None:
     assert at_10_hz(table(steady(1, [5, 5], at=0))[:0], 5.0).num_rows == 0
 
 
+def test_a_part_of_one_frame_stays_where_the_new_clock_has_its_instant() -> None:
+    cars = table(steady(1, [5], at=7, frame=4), steady(2, [5], at=8, frame=4), steady(3, [5, 5, 5], at=9, frame=5))
+    made = at_10_hz(cars, 20.0)
+    assert made["vehicle_id"].to_pylist() == [1, 2, 3]
+    assert made["frame"].to_pylist() == [2, 2, 3]
+    assert made["y"].to_pylist() == [*cars["y"].to_pylist()[:2], cars["y"].to_pylist()[3]]
+    assert at_10_hz(cars[:1], 40.0)["frame"].to_pylist() == [1]
+    assert at_10_hz(cars[:1], 30.0).num_rows == 0
+
+
 def test_ten_frames_per_second_stay() -> None:
     cars = table(steady(1, [5] * 4, at=0))
     assert at_10_hz(cars, 10.0) is cars

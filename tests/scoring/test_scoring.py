@@ -1,5 +1,7 @@
 """Scoring against cases computed by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from cases import random_encounters
@@ -8,7 +10,8 @@ from merge_cosim.core.encounter import NEVER, Ragged, ReplayLog
 from merge_cosim.core.observation import Observation
 from merge_cosim.scoring.human_difference import human_difference
 from merge_cosim.scoring.rules import Rules, Watch, expected_cycles
-from merge_cosim.scoring.scoring import HOST_INTO_MERGING, MERGING_INTO_HOST, SIDE, score
+from merge_cosim.scoring.scoring import HOST_INTO_LEADER, HOST_INTO_MERGING, MERGING_INTO_HOST, SIDE, score
+from merge_cosim.scoring.surroundings import AROUND
 from merge_cosim.scoring.tracks import Tracks
 
 DEFAULTS = Rules()
@@ -243,3 +246,19 @@ def test_nothing_to_score_gives_no_rows():
     encounters = random_encounters(3, seed=9)
     tracks = Tracks.of(encounters, [], [])
     assert all(values.shape == (0,) for values in score(tracks, Rules()).values())
+
+
+def test_a_contact_with_the_leader_counts_where_the_two_had_none():
+    """The host touches its leader by more than the tolerance, exactly by it, or not; in the last it hits the other."""
+    for merging, gaps, kind in (
+        (line(-200, 10), [9.0, -0.1], HOST_INTO_LEADER),
+        (line(-200, 10), [9.0, -1e-6], 0),
+        (line(-200, 10), [9.0, 0.1], 0),
+        (line(3, 10), [9.0, -0.1], SIDE),
+        (line(3, 10), [9.0, 0.1], SIDE),
+    ):
+        tracks = laid(line(0, 10, 2), merging[:2])
+        around = {name: np.array(gaps) for name in AROUND}
+        columns = score(replace(tracks, around=around), DEFAULTS)
+        assert columns["kind"].tolist() == [kind]
+        assert columns["min_leader_gap_m"].tolist() == [min(gaps)]

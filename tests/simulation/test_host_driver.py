@@ -68,6 +68,31 @@ def test_what_is_no_number_for_each_is_refused(values, amiss):
         decided(AlwaysGo(), Command(values=values))
 
 
+class Aiming(Acc):
+    """Keeps who is to go first."""
+
+    def command(self, seen, log_odds, target):
+        self.target = target.tolist()
+        return np.zeros(len(log_odds))
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "station", "target"),
+    [
+        ((0.5, -0.5), (-70.0, -90.0), [True, False]),
+        ((0.0, -1e-9), (-70.0, -90.0), [True, False]),
+        ((-2.0, 2.0), (0.0, 0.0), [True, False]),  # in the lane, ahead of the host and behind it
+        ((-2.0, 2.0), (-1.0, -1.0), [False, True]),
+    ],
+)
+def test_in_the_lane_who_is_ahead_goes_first_and_before_it_who_is_believed_to(log_odds, station, target):
+    seen = (np.array([-60.0, 60.0]), np.full(2, 25.0), np.array(station), np.full(2, 20.0), np.full(2, 5.0))
+    driver = HostDriver(Belief(values=np.array(log_odds)), Aiming())
+    driver.start(2, Setting())
+    driver.decide(Observation(*seen, np.full(2, 4.0)))
+    assert driver.controller.target == target
+
+
 @dataclass(kw_only=True)
 class Counting(Estimator):
     """Returns how many cycles a slot has seen since its reset, and keeps the streams that it was given."""
@@ -101,6 +126,42 @@ def test_blocks_are_added_while_others_go_on():
     idle, _ = blocks.decide(four, np.array([False, False, True, False]))
     assert idle.tolist() == [0.0, 0.0, 2.0, 2.0]  # the first block was left out
     assert blocks.decide(four, np.array([True, False, False, False]))[0].tolist()[:2] == [3.0, 2.0]
+
+
+def test_a_reset_leaves_other_blocks_alone():
+    blocks = DriverBlocks(HostDriver(Counting(), Acc()), 2, Setting())
+    blocks.make_room(6)
+    six, every = (
+        Observation(*(np.tile(getattr(SEEN, name), 3) for name in Observation.__match_args__)),
+        np.ones(6, bool),
+    )
+    blocks.decide(six, every)
+    for rows, ages in (([0], [1, 2, 2, 2, 2, 2]), ([3], [2, 3, 3, 1, 3, 3]), ([5, 0], [1, 4, 4, 2, 4, 1])):
+        blocks.reset(np.array(rows), np.zeros(len(rows), dtype=int), np.array(rows, dtype=np.uint64))
+        assert blocks.decide(six, every)[0].tolist() == ages
+    assert [one.estimator.keys for one in blocks._blocks] == [[0, 0], [3], [5]]
+
+
+def test_a_single_block_is_left_out_where_nobody_drives():
+    blocks = DriverBlocks(HostDriver(Counting(), Acc()), 2, Setting())
+    blocks.make_room(2)
+    assert blocks.decide(SEEN, np.zeros(2, bool))[0].tolist() == [0.0, 0.0]
+    assert blocks.decide(SEEN, np.array([False, True]))[0].tolist() == [1.0, 1.0]
+
+
+def test_left_out_slots_leave_every_part():
+    driver = HostDriver(AlwaysGo(), Acc())
+    assert driver.can_thin
+    for parts in ((Counting(), Acc()), (AlwaysGo(), Aiming()), (AlwaysGo(), Acc(), Noisy())):
+        assert not HostDriver(*parts).can_thin
+    blocks, gone = DriverBlocks(driver, 3, Setting()), []
+    blocks.make_room(3)
+    block = blocks._blocks[0]
+    for part in (block.sensor, block.estimator, block.controller):
+        part.thin = lambda rows, part=part: gone.append((type(part).__name__, rows.tolist()))
+    blocks.thin(np.array([2]))
+    assert gone == [("Perfect", [2]), ("AlwaysGo", [2]), ("Acc", [2])]
+    assert blocks._size == 1
 
 
 def test_rows_that_rest_are_those_of_their_block():

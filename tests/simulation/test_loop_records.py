@@ -200,6 +200,7 @@ def test_efforts_add_up_but_for_the_worst():
     assert [getattr(one, field.name) for field in fields(Effort)] == [4, 8, 16, 32, 64, 128, 256, 3 * 128.0]
     one.add(Effort())
     assert one.worst_difference_m == 3 * 128.0
+    assert Effort() == Effort(*[0] * len(fields(Effort)))
 
 
 class Passing(World):
@@ -210,14 +211,15 @@ class Passing(World):
 
     kind = "closed-form"
     channels = ("host_x_m",)
-    begins, cycles = (0, 0, 2, 3, 9), (4, 6, 5, 3, 50)
+    begins, cycles, point = (0, 0, 2, 3, 9), (4, 6, 5, 3, 50), 900.0
 
     def __init__(self):
         self.slots, self.now, self.open, self.kept, self.step_s = 1, -1, {}, [], 7.0
-        self.vehicle_steps = 0
+        self.vehicle_steps, self.seen, self.was_over = 0, [], []
 
     def start(self, encounters, setting, rules, leader, seed):
         """Nothing is known beforehand."""
+        self.seed = seed
 
     @property
     def goes_on(self):
@@ -272,6 +274,9 @@ class Passing(World):
     def observe(self, state, around):
         state[:], around[:] = self.state.round(6), self.state[:1].round(6) + 1000
 
+    def show(self, log_odds):
+        self.seen.append(log_odds.tolist())
+
     def _leave(self, places, back):
         if not places:
             return None
@@ -281,11 +286,11 @@ class Passing(World):
             cases.append(len(self.kept) if k % 2 else -1)
             self.kept += [k] * (k % 2)
         begun, n = 30.0 + 0.1 * np.array([self.begins[k] for k in gone]), len(gone)
-        return Ended(
-            np.array(places), np.array(cases), np.array([f"e{k}" for k in gone]), back, begun, np.full(n, 900.0)
-        )
+        points = None if self.point is None else np.full(n, self.point)
+        return Ended(np.array(places), np.array(cases), np.array([f"e{k}" for k in gone]), back, begun, points)
 
     def ended(self, over, age):
+        self.was_over += [(self.now, self.open[place]) for place in over.tolist() if place in self.open]
         return self._leave([place for place, k in self.open.items() if age[place] == self.cycles[k] + 1], 1)
 
     def finish(self, age):
@@ -348,3 +353,43 @@ def test_an_encounter_that_the_world_finds_is_over_by_its_settled_stations():
     world.begins, world.cycles = (9, 0), (50, 50)
     found = Loop(world, None, HostDriver(AlwaysGo(), Steady()), Same(), Rules(horizon=0.1), Setting()).run()
     assert found.columns["end_cycle"].tolist() == [11]
+
+
+@pytest.mark.parametrize("time_out", [0.2, 0.3, 0.5])
+def test_room_is_made_for_encounters_that_outlast_the_longest(time_out):
+    """The record holds as many cycles as the time out has, until one of the world's encounters goes on beyond it."""
+    found = passed(Rules(horizon=60.0, time_out=time_out), Everything())
+    most = round(time_out * 10)
+    for name, trace in found.traces.items():
+        k, stays = int(name[1:]), min(most, (4, 6, 5, 3, 3)[int(name[1:])])
+        np.testing.assert_allclose(trace["host_station_m"], -20.0 - k + 0.1 * (20.0 + k) * np.arange(stays), atol=1e-6)
+    assert found.columns["end_cycle"].tolist() == [min(most, 6), min(most, 3)]
+
+
+def test_without_a_point_to_settle_an_encounter_is_over_when_it_was():
+    """Stations are 100 m too small all the time, so that the time out alone ends one: e1 and e2 last longer."""
+    world = Passing()
+    world.point = None
+    rules = Rules(horizon=60.0, time_out=0.4)
+    found = Loop(world, None, HostDriver(AlwaysGo(), Steady()), Same(), rules, Setting(), Everything()).run()
+    assert {name: len(trace) for name, trace in found.traces.items()} == {"e0": 4, "e1": 4, "e2": 4, "e3": 3, "e4": 3}
+    assert found.columns["end_cycle"].tolist() == [4, 3]
+    assert world.was_over == [(3, 0), (3, 1), (5, 2), (6, 3)]
+
+
+def test_a_window_is_shown_what_is_believed():
+    shown, hidden = Passing(), Passing()
+    shown.shown = True
+    for world in (shown, hidden):
+        Loop(world, None, HostDriver(AlwaysGo(), Steady()), Same(), Rules(), Setting()).run()
+    assert hidden.seen == []
+    assert len(shown.seen) == 12
+    assert shown.seen[0] == [-np.inf, -np.inf]
+
+
+def test_the_seed_is_the_worlds():
+    world, driver = Passing(), HostDriver(AlwaysGo(), Steady())
+    Loop(world, None, driver, Same(), Rules(), Setting())
+    assert world.seed == 0
+    Loop(world, None, driver, Same(), Rules(), Setting(), seed=5)
+    assert world.seed == 5
