@@ -62,7 +62,8 @@ class Rollout(ReactingDriver, Acc):
     the chosen policy's overlap has the probability `tolerated_risk` or more, the command is the nearest one that leaves
     an escape for the next cycle. Where none exists within the bounds `-escape_braking` to `escape_acceleration`, they
     are narrowed in `escape_grades` steps around what the driver is expected to do now, until one does; where none does
-    even so, the policy is chosen with the cost `last_overlap` of an overlap. With `tolerated_risk=0` an escape from
+    even so, the policy is chosen with the cost `last_overlap` of an overlap. A driver who stands at the merging point
+    beside the host is taken to wait until the host has passed. With `tolerated_risk=0` it is not, and an escape from
     the full bounds is never given up.
 
     Once the merging car is in the lane the law of acc drives. Beliefs, margins and reaction are those of the estimator
@@ -174,6 +175,7 @@ class Rollout(ReactingDriver, Acc):
             self.max_acceleration,
             self.escape_braking,
             self.escape_acceleration,
+            self.driver_d0 if self.tolerated_risk else -np.inf,
             self.follower_braking,
             self.follower_reaction,
             setting.speed_limit,

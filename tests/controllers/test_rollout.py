@@ -6,15 +6,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rollout_reference import costs
 
-from merge_cosim.controllers.compiled.escapes import FORCED, LEFT, NONE, UNSEEN, Bounds, escapes, kept, narrowed
+from merge_cosim.controllers.compiled.escapes import (
+    FORCED,
+    LEFT,
+    NONE,
+    UNSEEN,
+    Bounds,
+    escapes,
+    kept,
+    narrowed,
+    waits_beside,
+)
 from merge_cosim.controllers.rollout import POLICIES, Rollout
 from merge_cosim.core.observation import Observation, Setting
+from merge_cosim.core.units import TOLERANCE
 from merge_cosim.estimators.acc import AccMerging
 from merge_cosim.estimators.interactive import Interactive
 from merge_cosim.simulation.host_driver import HostDriver
 
 LIMIT = 29.0
-BOUNDS = Bounds(-4.0, 2.0, 4.0, 3.0, 3.0, 0.3, LIMIT, 0.1, 200)
+BOUNDS = Bounds(-4.0, 2.0, 4.0, 3.0, -np.inf, 3.0, 0.3, LIMIT, 0.1, 200)
 FULL = -4.0, 3.0, 0.0
 
 
@@ -160,7 +171,39 @@ def test_after_the_merge_the_law_of_acc_drives():
     ],
 )
 def test_escapes_by_hand(state, then, holds):
-    assert escapes(then, then, np.array([*state, 5.0, 5.0]), *FULL, BOUNDS) == holds
+    assert escapes(then, then, np.array([*state, 5.0, 5.0]), *FULL, TOLERANCE, BOUNDS) == holds
+
+
+@pytest.mark.parametrize(
+    ("host", "merging", "speed", "waits"),
+    [
+        (-0.002, -0.1, 0.0, True),  # level with it
+        (6.8, -0.1, 0.0, True),  # its rear is not yet 2 m past
+        (7.0, -0.1, 0.0, False),
+        (-0.2, -0.1, 0.0, False),  # behind it: the driver may go first
+        (-0.002, -0.1, 0.2, False),  # it moves
+        (-2.0, -2.1, 0.0, False),  # not at the merging point
+        (5.0, 0.0, 0.0, False),  # in the lane
+    ],
+)
+def test_a_driver_who_stands_beside_the_host_waits_for_it(host, merging, speed, waits):
+    """Standing keeps an escape, and so would every driver's start be guarded against: both would wait for ever."""
+    assert waits_beside(host, 5.0, merging, speed, 2.0) == waits
+    state = np.array([host, 0.0, merging, speed, 5.0, 5.0])
+    if waits:
+        assert kept(2.0, state, *FULL, BOUNDS._replace(past=2.0))
+
+
+def test_only_the_strict_guarantee_waits_beside_a_standing_driver():
+    state = -0.002, 0.0, -0.1, 0.0
+    assert guarded(planner(), state)._last[0] > 1.0
+    assert guarded(planner(tolerated_risk=0.0), state)._last[0] <= 0.0
+
+
+def test_a_new_command_stops_a_millimetre_before_the_merging_point():
+    state = np.array([-0.0005, 0.0, -0.0005, 0.0, 5.0, 5.0])
+    assert not kept(0.0, state, *FULL, BOUNDS)
+    assert escapes(-4.0, -4.0, state, *FULL, TOLERANCE, BOUNDS)
 
 
 def test_bounds_are_narrowed_around_what_is_expected():

@@ -10,22 +10,38 @@ from merge_cosim.estimators.compiled.drivers import TOL
 
 SHORT = 0.001
 """Way before the merging point [m] within which the host counts as having reached it."""
+STANDS = 0.1
+"""Speed [m/s] below which a driver stands."""
 UNSEEN, NONE, LEFT, FORCED = -1, 0, 1, 2
 """Not looked at; no escape exists; the wanted acceleration leaves one; the acceleration was changed to leave one."""
 
 
 class Bounds(NamedTuple):
-    """What the host can do and the merging driver may do, see `merge_cosim.controllers.rollout.Rollout`."""
+    """What the host can do and the merging driver may do, see `merge_cosim.controllers.rollout.Rollout`.
+
+    `past` is how far past a standing driver the host must be for it to start [m], -inf for one that starts at any time.
+    """
 
     min_acceleration: float
     max_acceleration: float
     driver_braking: float
     driver_acceleration: float
+    past: float
     follower_braking: float
     follower_reaction: float
     speed_limit: float
     dt: float
     cycles: int
+
+
+@njit(cache=True)
+def waits_beside(host_station: float, host_length: float, station: float, speed: float, past: float) -> bool:
+    """Whether a driver stands at the merging point with the host level with it or ahead, not yet past by `past`.
+
+    Who stands there cannot come into the lane but into the host's side, so it waits until the host has passed.
+    """
+    stands = speed < STANDS and -past <= station < -TOL
+    return stands and -TOL <= host_station - station < host_length + past
 
 
 @njit(cache=True)
@@ -36,6 +52,7 @@ def escapes(
     low: float,
     high: float,
     since: float,
+    stop: float,
     bounds: Bounds,
 ) -> bool:
     """Whether acceleration `first` for one cycle and `then` ever after avoids an overlap for certain.
@@ -43,9 +60,13 @@ def escapes(
     Until the host's front reaches the merging point the driver may do anything from `low` to `high`, so its stations
     lie between those of these two. If all of them are then upstream of the merging point, the driver comes behind: it
     may accelerate until it is in the lane, and a reaction time later brakes at least with `follower_braking`. If all
-    are a length ahead, it may go on with `low`. A driver already in the lane has been there for the time `since`.
+    are a length ahead, it may go on with `low`. A driver already in the lane has been there for the time `since`. A
+    driver who stands beside the host waits until the host has passed, so that the host may do anything. A stop counts
+    that ends at least `stop` before the merging point.
     """
     host_station, host_speed, station, speed, host_length, length = state
+    if waits_beside(host_station, host_length, station, speed, bounds.past):
+        return True
     dt = bounds.dt
     top = max(bounds.speed_limit, speed)
     slow_station, slow_speed = station, speed
@@ -69,7 +90,7 @@ def escapes(
         else:
             fast_speed = min(max(fast_speed + high * dt, 0.0), top)
         fast_station += fast_speed * dt
-        if host_station < -TOL and host_speed <= 0.0:
+        if host_station < -stop and host_speed <= 0.0:
             return True
         if host_station < -SHORT:
             continue
@@ -112,9 +133,12 @@ def kept(
     since: float,
     bounds: Bounds,
 ) -> bool:
-    """Whether an escape is left after one cycle of acceleration `first`."""
+    """Whether an escape is left after one cycle of acceleration `first`; a stop with the way `SHORT` to spare.
+
+    So a host that creeps up to the merging point does not come to stand a rounding error before it.
+    """
     for then in (bounds.min_acceleration, bounds.max_acceleration):
-        if escapes(first, then, state, low, high, since, bounds):
+        if escapes(first, then, state, low, high, since, SHORT, bounds):
             return True
     return False
 
@@ -160,12 +184,12 @@ def constrain(
             status[row] = NONE
             nearest = np.inf
             for bound in (bounds.min_acceleration, bounds.max_acceleration):
-                if not escapes(bound, bound, state[:, row], low, high, since[row], bounds):
+                if not escapes(bound, bound, state[:, row], low, high, since[row], TOL, bounds):
                     continue
                 status[row] = FORCED
                 for level in range(1, levels + 1):
                     tried = first + (bound - first) * level / levels
-                    if level == levels or escapes(tried, bound, state[:, row], low, high, since[row], bounds):
+                    if level == levels or escapes(tried, bound, state[:, row], low, high, since[row], SHORT, bounds):
                         if abs(tried - first) < nearest:
                             nearest, wanted[row] = abs(tried - first), tried
                         break
@@ -183,9 +207,9 @@ def widest(
         for share in shares:
             low, high = narrowed(share, centre[row], bounds)
             if escapes(
-                bounds.min_acceleration, bounds.min_acceleration, state[:, row], low, high, since[row], bounds
+                bounds.min_acceleration, bounds.min_acceleration, state[:, row], low, high, since[row], TOL, bounds
             ) or escapes(
-                bounds.max_acceleration, bounds.max_acceleration, state[:, row], low, high, since[row], bounds
+                bounds.max_acceleration, bounds.max_acceleration, state[:, row], low, high, since[row], TOL, bounds
             ):
                 found[row] = share
                 break

@@ -11,7 +11,7 @@ import numpy as np
 from merge_cosim.core.encounter import NEVER, Encounters, Intention
 from merge_cosim.core.observation import Setting
 from merge_cosim.core.random_streams import stream_keys
-from merge_cosim.core.units import AnyArray, FloatArray, IntArray
+from merge_cosim.core.units import TOLERANCE, AnyArray, FloatArray, IntArray
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.scoring.rules import Rules
 from merge_cosim.scoring.surroundings import AROUND
@@ -247,10 +247,12 @@ class TrafficWorld(World):
         """Leave SUMO running; the caller that started it closes it."""
 
     def settled(self, track: FloatArray, point: float) -> FloatArray:
-        """See `World`."""
+        """See `World`; a car that stood where it then changed lane is just before that place until it does."""
         track = track.copy()
+        beside = track[MERGING_STATION] < -TOLERANCE
         for row, x in zip((HOST_STATION, MERGING_STATION), track[RECORDED:], strict=False):
             track[row] = x - point
+        track[MERGING_STATION, beside] = np.minimum(track[MERGING_STATION, beside], -2 * TOLERANCE)
         return track
 
     def note_absent(self, announced: Iterable[str] = (), departures: Mapping[str, float] = _NO_DEPARTURES) -> None:

@@ -103,6 +103,28 @@ def test_standing_counts_before_the_lane_change(tmp_path):
     assert all(len(values) == 0 for values in run.columns.values())  # nothing to score
 
 
+def test_a_car_that_stood_beside_the_host_was_not_in_the_lane_yet(tmp_path):
+    """It changes lane where it stands, once the host has passed it: no overlap."""
+    cars = (vehicle("h", "host", 380, 20), vehicle("m", "merging", 440, 20, route="ramp"))
+    with us101(tmp_path, *cars) as (api, driven):
+        api.simulationStep()
+        api.vehicle.setSpeedMode("m", 32)
+        api.vehicle.setLaneChangeMode("m", 0)
+        driven.cycle()
+
+        def each(_):
+            there = api.vehicle.getLaneID("m") != "ramp_0" and api.vehicle.getLanePosition("m") >= 30.0
+            api.vehicle.setSpeed("m", 0.0 if there else 20.0)
+            if api.vehicle.getPosition("h")[0] > api.vehicle.getPosition("m")[0] + 20.0:
+                api.vehicle.changeLane("m", 1, 0.0)
+
+        drive(api, driven, 80, each)
+        run = driven.close()
+    assert run.columns["merging_stopped"].tolist() == [True]
+    assert run.columns["kind"].tolist() == [0]
+    assert run.columns["min_gap_m"][0] > 10.0
+
+
 def test_the_more_binding_of_leader_and_merging_car_counts(tmp_path):
     """With a leader close ahead the host drives no faster than without, in any cycle."""
     speeds = {}
