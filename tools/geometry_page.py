@@ -175,9 +175,9 @@ HEAD = """\
 # The geometry of US-101 and I-80
 
 Both nets are true to scale and georeferenced: lane counts and widths, the curve of the road, on-ramp, off-ramp,
-gore, auxiliary lane (US-101) and acceleration lane (I-80). In the median logged cars are a few decimetres from the centre
-of their lane in the net ([US-101](#us-101), [I-80](#i-80)); where it is worse, and why, is under [weaknesses](#weaknesses).
-The plain XML in `sumo_nets/` is written by
+gore, auxiliary lane (US-101) and acceleration lane (I-80). In the median logged cars are a few decimetres from the
+centre of their lane in the net ([US-101](#us-101), [I-80](#i-80)); where it is worse, and why, is under
+[weaknesses](#weaknesses). The plain XML in `sumo_nets/` is written by
 
     python tools/ramp_geometry.py --data DIR       # DIR/geometry/ and NGSIM's trajectories; writes and builds both
     python tools/geometry_page.py --data DIR       # this page

@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from blocks import fill_page, page_parser, table
+from model_flips import under_models, what_flips
 
 import merge_cosim as mc
 from merge_cosim.report.methods import looks
@@ -108,7 +109,16 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, help="folder with real NGSIM files")
     given = parser.parse_args(argv)
-    fill_page("tests.md", given.docs, {"headroom": partial(block, given.data, given.short, given.docs)})
+    kinds = {"headroom": partial(block, given.data, given.short, given.docs), "models": partial(models, given.data)}
+    fill_page("tests.md", given.docs, kinds)
+
+
+def models(data: Path | None, scenario: str) -> str | None:
+    """What of a scenario's table depends on the model; None without data, and for the blocks of another tool."""
+    if data is None or scenario != "designed-3":
+        return None
+    words = ["sweep", scenario, "--method", ",".join(METHODS), "--world", "closed-form"]
+    return what_flips(under_models(words, data), "scenario")
 
 
 if __name__ == "__main__":

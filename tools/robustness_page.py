@@ -1,10 +1,10 @@
 """Write the tables of docs/sensors.md and of the shifted drivers in docs/tests.md, for drivers and errors not made for.
 
-    python tools/robustness_page.py [--sensing DIR] [--shifted DIR] [--data DIR | --models DIR]
+    python tools/robustness_page.py [--sensing DIR] [--shifted DIR] [--data DIR]
 
 runs the two sweeps that the pages show, in the closed form, and sets their summaries into the pages' blocks. With the
-NGSIM files in `--data`, the sweep of the sensors is also run under ten models, each trained on another third of the
-cars, to see what depends on them; `--models` takes its result folder. Without either that part of the page stays.
+NGSIM files in `--data` both are also run under ten models, each trained on another third of the cars, to see what
+depends on them; `--models` and `--shifted-models` take the result folders of that. Without them those parts stay.
 """
 
 import tempfile
@@ -14,11 +14,11 @@ from textwrap import fill
 
 import pandas as pd
 from blocks import fill_page, page_parser, table
+from model_flips import under_models, what_flips
 
 from merge_cosim.cli.main import app
 from merge_cosim.report.methods import in_order
-from merge_cosim.results.statistics.ensemble import RANK, rivals
-from merge_cosim.studies.training import train_ensemble
+from merge_cosim.results.statistics.ensemble import RANK
 
 SENSING = (
     *("sweep", "designed-3", "--world", "closed-form", "--method", "acc,slot-time,pgm,ipcb"),
@@ -29,7 +29,6 @@ SENSING = (
 SHIFTED = ("sweep", "designed-3", "shifted", "--world", "closed-form", "--method", "acc,slot-time,pgm,ipcb,oracle-best")
 LATE, NOISY = "sensing.delay=0.5", "sensing.speed_sigma=0.5"
 """Errors that the page's first lines tell."""
-MODELS = 10
 SHORT = ("--set", "encounters.count=8", "--jobs", "1")
 
 
@@ -71,28 +70,6 @@ def in_short(summary: pd.DataFrame) -> str:
     )
 
 
-def under_models(summary: pd.DataFrame) -> str:
-    """Which orders of two methods, and which effects of an error, are not the same under every model."""
-    models, errors = summary["model"].replace("", pd.NA).nunique(), summary["variation"].nunique()
-    pairs = rivals(summary)
-    flips = pairs[(pairs["first_better"] > 0) & (pairs["second_better"] > 0)]
-    parts = [f"Under {models} models, each trained on another third of the real cars: "]
-    for (first, second), rows in flips.groupby(["first", "second"]):
-        counts = " to ".join(map(str, sorted({rows["first_better"].min(), rows["first_better"].max()})))
-        parts.append(
-            f"which of {first} and {second} fails or gets stuck less depends on the model in {len(rows)} of the "
-            f"{errors} rows ({first} under {counts} of the {models}); "
-        )
-    parts.append(f"{'no other order' if len(flips) else 'no order'} of two methods depends on it. ")
-    for method, rows in summary[summary["model"] != ""].groupby("method"):
-        rates = rows.pivot(index="variation", columns="model", values=RANK)
-        rises = (rates.sub(rates.loc[""]) > 0).sum(axis=1).drop("")
-        mixed = [f"`{name}` ({count})" for name, count in rises.items() if 0 < count < models]
-        if mixed:
-            parts.append(f"{method} gets worse by these errors under some of the models only: {', '.join(mixed)}. ")
-    return _wrapped("".join(parts))
-
-
 def _wrapped(text: str) -> str:
     return fill(text, 120, break_on_hyphens=False, break_long_words=False) + "\n"
 
@@ -103,23 +80,31 @@ def main(argv: Sequence[str] | None = None) -> None:
     for name in ("sensing", "shifted"):
         parser.add_argument(f"--{name}", type=Path, help="result folder of this sweep, if it was run already")
     parser.add_argument("--data", type=Path, help="folder with real NGSIM files, to train models on")
-    parser.add_argument("--models", type=Path, help="result folder of the sensors under several models")
+    for name in ("models", "shifted-models"):
+        parser.add_argument(f"--{name}", type=Path, help="result folder of this sweep under several models")
     given = parser.parse_args(argv)
-    summary, models = summary_of(SENSING, given.short, given.sensing), None
-    if given.data is not None:
-        folder = Path(tempfile.mkdtemp(prefix="models-"))
-        train_ensemble("us101", given.data, "ngsim", 0, folder, splits=MODELS)
-        models = summary_of((*SENSING, "--model", str(folder)), given.short, None)
-    elif given.models is not None:
-        models = summary_of((), given.short, given.models)
+    summary = summary_of(SENSING, given.short, given.sensing)
+    models = _under_models(SENSING, given.data, given.models)
     parts = {
         "sensing": block(SENSING, summary, "variation"),
         "short": in_short(summary),
-        "models": None if models is None else under_models(models),
+        "models": None if models is None else what_flips(models, "variation", ""),
     }
     fill_page("sensors.md", given.docs, {kind: lambda _, made=made: made for kind, made in parts.items()})
     shifted = block(SHIFTED, summary_of(SHIFTED, given.short, given.shifted), "scenario")
-    fill_page("tests.md", given.docs, {"shifted": lambda _: shifted})
+    models = _under_models(SHIFTED, given.data, given.shifted_models)
+    flips = None if models is None else what_flips(models, "scenario", "designed-3")
+    fill_page(
+        "tests.md",
+        given.docs,
+        {"shifted": lambda _: shifted, "models": lambda name: flips if name == "shifted" else None},
+    )
+
+
+def _under_models(words: Sequence[str], data: Path | None, folder: Path | None) -> pd.DataFrame | None:
+    if folder is not None:
+        return pd.read_json(folder / "summary.json")
+    return None if data is None else under_models(words, data)
 
 
 if __name__ == "__main__":

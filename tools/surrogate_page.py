@@ -177,8 +177,8 @@ HEAD = """\
 Without NGSIM files the replay scenarios run on a *surrogate*: SUMO's own traffic on the same two ramps, written in
 NGSIM's columns and units and read by the same reader, with the same rules for pairs. Rows of results and
 headings then say `surrogate`. It replaces the data so that everything can be tried and tested; it is no evidence about
-human drivers. In short: speeds, distances and the share of yielding are near those of the real pairs; accelerations are too
-smooth, merging happens too early, and the order of the two cars is less clear from afar
+human drivers. In short: speeds, distances and the share of yielding are near those of the real pairs; accelerations are
+too smooth, merging happens too early, and the order of the two cars is less clear from afar
 ([where it falls short](#where-it-falls-short)).
 
     merge-cosim ngsim surrogate --out DIR          # the files themselves; both sites take about a minute, once
