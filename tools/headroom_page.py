@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from blocks import fill_page, page_parser, table
-from model_flips import under_models, what_flips
+from model_flips import paragraph, under_models, what_flips
 
 import merge_cosim as mc
 from merge_cosim.report.methods import looks
@@ -118,7 +118,7 @@ def models(data: Path | None, scenario: str) -> str | None:
     if data is None or scenario != "designed-3":
         return None
     words = ["sweep", scenario, "--method", ",".join(METHODS), "--world", "closed-form"]
-    return what_flips(under_models(words, data), "scenario")
+    return paragraph(what_flips(under_models(words, data), "scenario"))
 
 
 if __name__ == "__main__":

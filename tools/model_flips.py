@@ -57,4 +57,9 @@ def what_flips(summary: pd.DataFrame, row: str, base: str | None = None) -> str:
             if mixed:
                 text += f"Whether {method} does worse than with {first} depends on it for {', '.join(mixed)} (models "
                 text += "under which it does). "
+    return text.rstrip()
+
+
+def paragraph(text: str) -> str:
+    """Text in the lines of a page."""
     return fill(text, 120, break_on_hyphens=False, break_long_words=False) + "\n"

@@ -10,11 +10,10 @@ depends on them; `--models` and `--shifted-models` take the result folders of th
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from textwrap import fill
 
 import pandas as pd
 from blocks import fill_page, page_parser, table
-from model_flips import under_models, what_flips
+from model_flips import paragraph, under_models, what_flips
 
 from merge_cosim.cli.main import app
 from merge_cosim.report.methods import in_order
@@ -63,15 +62,11 @@ def in_short(summary: pd.DataFrame) -> str:
         return ", ".join(f"{name} {rates.at['', name]:.2f} to {rates.at[variation, name]:.2f} %" for name in rates)
 
     worst = " or ".join(f"`{name}`" for name in dict.fromkeys(rates.idxmax()))
-    return _wrapped(
+    return paragraph(
         f"Hosts that fail or get stuck in `designed-3`, without an error and with the merging car seen 0.5 s late: "
         f"{change(LATE)}. With noise of 0.5 m/s in its speed: {change(NOISY)}. Of the errors tried ([table]"
         f"(#what-errors-do-in-designed-3)) the worst is {worst}."
     )
-
-
-def _wrapped(text: str) -> str:
-    return fill(text, 120, break_on_hyphens=False, break_long_words=False) + "\n"
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -88,12 +83,12 @@ def main(argv: Sequence[str] | None = None) -> None:
     parts = {
         "sensing": block(SENSING, summary, "variation"),
         "short": in_short(summary),
-        "models": None if models is None else what_flips(models, "variation", ""),
+        "models": None if models is None else paragraph(what_flips(models, "variation", "")),
     }
     fill_page("sensors.md", given.docs, {kind: lambda _, made=made: made for kind, made in parts.items()})
     shifted = block(SHIFTED, summary_of(SHIFTED, given.short, given.shifted), "scenario")
     models = _under_models(SHIFTED, given.data, given.shifted_models)
-    flips = None if models is None else what_flips(models, "scenario", "designed-3")
+    flips = None if models is None else paragraph(what_flips(models, "scenario", "designed-3"))
     fill_page(
         "tests.md",
         given.docs,

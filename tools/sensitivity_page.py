@@ -3,7 +3,9 @@
     python tools/sensitivity_page.py [--data DIR]
 
 runs one `merge-cosim sweep` with a `--vary` per choice, in closed form where a method allows it, and sets its summary
-out as tables, each row one value, each column one method, with what they show put into words by rule.
+out as tables, each row one value, each column one method, with what they show put into words by rule. With `--data` it
+also runs Designed Test II with the defaults under models of other thirds of the cars; `--models` takes the result
+folder of that.
 """
 
 import shlex
@@ -15,6 +17,7 @@ from pathlib import Path
 
 import pandas as pd
 from blocks import page_parser
+from model_flips import under_models, what_flips
 
 from merge_cosim.cli.main import app
 from merge_cosim.controllers.base import controllers
@@ -69,6 +72,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = page_parser(__doc__)
     parser.add_argument("--data", help="folder with NGSIM files")
     parser.add_argument("--from", dest="folder", type=Path, help="result folder of the sweep, if it was run already")
+    parser.add_argument("--models", type=Path, help="result folder of designed-2 under several models")
     arguments = parser.parse_args(argv)
     choices = SHORT if arguments.short else tuple(CHOICES)
     words = ["merge-cosim", "sweep", "designed-2", *(() if arguments.short else ("us101-replay",))]
@@ -87,7 +91,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     source = "real NGSIM data (fragments and merging episodes)" if real else "the SYNTHETIC surrogate"
     command = " ".join(shlex.quote(word) for word in [*words, *(["--data", "DIR"] if real else []), "--out", "OUT"])
     parts = [HEAD.format(source=source, command=command.replace(" --", " \\\n    --"), out="OUT")]
-    parts.append(findings(rows))
+    models = None
+    if arguments.models is not None:
+        models = pd.read_json(arguments.models / "summary.json")
+    elif arguments.data is not None:
+        models = under_models(
+            ["sweep", "designed-2", "--method", ",".join(RIVALS), "--world", "closed-form"], Path(arguments.data)
+        )
+    parts.append(findings(rows, models))
     titles = {choice.partition("=")[0]: title for choice, title in CHOICES.items()}
     parts += [section(rows, name, titles[name]) for name in (choice.partition("=")[0] for choice in choices)]
     (arguments.docs / "sensitivity.md").write_text("\n".join(parts), encoding="utf-8")
@@ -133,7 +144,7 @@ def default_value(scenario: str, name: str) -> object:
     return found
 
 
-def findings(rows: pd.DataFrame) -> str:
+def findings(rows: pd.DataFrame, models: pd.DataFrame | None = None) -> str:
     """What the tables show: the order of the methods, what turns it round, and which choice moves the rates most."""
     lines = ["## What it shows", ""]
     for scenario, here in rows[rows["method"].isin(RIVALS)].groupby("scenario"):
@@ -142,6 +153,8 @@ def findings(rows: pd.DataFrame) -> str:
         order = ", ".join(f"{method} {rate:.1f} %" for method, rate in default.sort_values(kind="stable").items())
         lines.append(f"- **{scenario}**, with the defaults: {order}.")
         lines[-1] += f" One case more or less is {100 / here['n'].max():.2g} points."
+        if models is not None and (models["scenario"] == scenario).all():
+            lines.append(f"- This is under one model. {what_flips(models, 'scenario')}")
         varied = rates.drop(index="")
         turned = [variation for variation, row in varied.iterrows() if reversed_pairs(default, row)]
         lines.append(f"- The order of two methods is reversed by {grouped(turned) or 'no value at all'}.")

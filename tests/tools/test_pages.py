@@ -90,7 +90,7 @@ def test_what_another_model_changes():
         for model, both in models.items()
         for error, rate in zip(("", "sensing.delay=1"), both, strict=True)
     ]
-    text = " ".join(model_flips.what_flips(pd.DataFrame(rows), "variation", "").split())
+    text = " ".join(model_flips.paragraph(model_flips.what_flips(pd.DataFrame(rows), "variation", "")).split())
     assert "not the same: acc before pgm under 1 of them in 2 of 2 rows. No other order" in text
     assert "Whether pgm does worse than with no error depends on it for `sensing.delay=1` (1) (models" in text
 
