@@ -98,6 +98,16 @@ def test_a_sample_is_judged_on_the_same_cases():
     )
 
 
+@pytest.mark.parametrize("bad", ["failed", "stuck"])
+def test_on_common_cases_to_be_stuck_is_as_bad_as_to_fail(bad):
+    rows = _rows("random", a=range(40), b=range(9)).assign(failed=False)
+    rows[bad] = rows["case"].astype(int).between(31, 39) & (rows["method"] == "b")
+    summary = _summary("random", a=(40, 0, 0, 1.0), b=(40, 9, 0, 1.0))
+    assert verdict(summary, rows).undecided == ()  # 9 of 9: p = 2 / 2^9
+    rows["censored"] = rows["case"].astype(int) > 35  # 5 of 5 are left: p = 0.06
+    assert verdict(summary, rows).undecided == ("b",)
+
+
 def test_common_cases_decide_what_the_counts_alone_do_not():
     summary = _summary("random", a=(40, 1, 0, 1.0), b=(40, 7, 0, 1.0))
     assert fisher_exact([[1, 39], [7, 33]]).pvalue > 0.05 > 2 / 2**6  # McNemar's, of the six that fail under b alone
