@@ -53,7 +53,7 @@ class Configuration:
     additional: tuple[Path, ...]
     begin: float
     end: float
-    step: float
+    step: float = DT
 
     @classmethod
     def read(cls, file: Path) -> Configuration:
