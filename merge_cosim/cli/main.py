@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -61,6 +62,8 @@ app.add_typer(ramp.app, name="ramp")
 
 USAGE_ERROR = cast("type[typer.BadParameter]", typer.BadParameter.__base__)
 """typer's UsageError; typer gives it no public name."""
+EMPTY = re.compile("--[a-z-]+=")
+"""An option with an empty value, which for a path would be the current folder."""
 
 Start = Literal["spawn", "forkserver", "fork"]
 
@@ -359,6 +362,8 @@ def main() -> None:
     import sys
 
     ended_by_signal()
+    if any(not word or EMPTY.fullmatch(word) for word in sys.argv[1:]):
+        die("an argument is empty, as where a variable of the shell is not set (see --help)")
     for name in ("LIBSUMO_AS_TRACI", "LIBTRACI_AS_TRACI"):
         os.environ.pop(name, None)  # with them `import traci` gives another module, and prints that it does
     try:

@@ -121,6 +121,8 @@ def plan(request: SweepRequest) -> list[Task]:
                 tasks += tasks_of(scenario, label, methods, request, loaded, given)
     if not tasks:
         raise UserError("nothing to run: no method fits the scenarios")
+    if isinstance(request.model, str) and not any(task.method.needs_model for task in tasks):
+        load_models(request.model)  # a mistake in it is told all the same
     reference_of(method_names(request, tasks), request.against)
     return sorted(
         tasks, key=lambda task: tuple(task.names[name] for name in ("scenario", "variation", "method", "model"))

@@ -7,7 +7,7 @@ import pytest
 from ngsim_files import car, write_csv, write_portal, write_text
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.ngsim.formats import NGSIM, OWN, Kind, sources
+from merge_cosim.ngsim.formats import NGSIM, OWN, Kind, Layout, missing_columns, sources
 from merge_cosim.ngsim.table import SCHEMA
 
 CAR = car(1, range(3))
@@ -65,6 +65,30 @@ def test_what_is_not_trajectory_data_is_noted(tmp_path, content, note):
     (source,) = sources(tmp_path / "a")
     assert source.kind is Kind.OTHER
     assert note in source.note
+
+
+@pytest.mark.parametrize(
+    ("columns", "is_meant"),
+    [
+        ("Vehicle_ID,Frame_ID,Local_X,Local_Y,v_Vel,Lane_ID", True),
+        ("Vehicle_ID,Frame_ID,Local_X,Local_Y,v_Vel", True),
+        ("Vehicle_ID,Frame_ID,Local_X,Local_Y", True),
+        ("Vehicle_ID,Frame_ID,Local_X", False),
+    ],
+)
+def test_a_file_that_lacks_two_columns_is_meant_to_be_ngsims(tmp_path, columns, is_meant):
+    (tmp_path / "a.csv").write_text(f"{columns}\n")
+    (source,) = sources(tmp_path / "a.csv")
+    assert (source.kind is Kind.TRAJECTORIES) == is_meant
+    assert len(missing_columns(source, NGSIM)) == 6 - len(columns.split(","))
+
+
+def test_a_layout_is_as_plain_as_can_be_unless_it_says_otherwise():
+    plain = Layout({"x": "X", "part": "P"}, "", 1.0, {})
+    assert plain.required == ["X"]
+    assert (plain.rate, plain.skip_first, plain.to_front, plain.default_length) == (10.0, 0, 0.0, 5.0)
+    assert not plain.of_site
+    assert not plain.smoothed
 
 
 def test_a_missing_file(tmp_path):

@@ -201,6 +201,11 @@ def test_a_rounded_clock_is_refused(tmp_path):
     assert "does not advance by 100 ms" in refused(write_csv(tmp_path / "a.csv", rows))
 
 
+@pytest.mark.parametrize("origin", [-5_000, -5_000_000_000_000, 5_000_000_000_000])
+def test_a_clock_outside_the_years_is_refused(tmp_path, origin):
+    assert "does not advance by 100 ms" in refused(write_csv(tmp_path / "a.csv", car(1, range(3), origin=origin)))
+
+
 def test_merging_keeps_common_rows_once(tmp_path):
     one = read_file(write_text(tmp_path / "a.txt", ROWS[:6]))
     two = read_file(write_portal(tmp_path / "b.csv", [("us-101", row) for row in ROWS[3:]]))

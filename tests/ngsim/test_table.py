@@ -70,6 +70,21 @@ def test_recordings_are_named_in_local_time():
     assert names == ["2005-06-15T0750", "2005-04-13T1659", "2005-06-15T0750", "2005-06-15T0750"]
 
 
+def test_names_are_rounded_to_the_minute_and_times_have_bounds():
+    def name(*origins):
+        return name_recordings(np.array(origins)).to_pylist()
+
+    assert name(0) == ["1969-12-31T1600"]
+    assert name(29_999) == ["1969-12-31T1600"]
+    assert name(30_000) == ["1969-12-31T1601"]
+    assert name(0, 60_000) == ["1969-12-31T1600"] * 2
+    assert name(0, 60_001) == ["1969-12-31T1600", "1969-12-31T1601"]
+    assert name(4_102_444_800_000) == ["2099-12-31T1600"]
+    for wrong in (-1, 4_102_444_800_001):
+        with pytest.raises(ClockError):
+            name(wrong)
+
+
 def test_a_drifting_clock_is_refused():
     start = 1_118_846_978_900
     longest = np.arange(start, start + 60_001, 20_000)

@@ -129,7 +129,7 @@ def summarise_folder(data: Path, sites: Sequence[Site] = ()) -> list[Summary]:
         UserError: It does not exist, a file is damaged, or there is nothing of these sites.
     """
     if not data.exists():
-        raise UserError(f"{data}: no such folder")
+        raise UserError(f"{data}: no such folder or file")
     sites = sites or _sites_in(data)
     found = [(each, site_pairs(data, each)) for each in sites]
     summaries = [summarise(paired, each.name, _source(paired, each)) for each, paired in found if paired is not None]
