@@ -140,6 +140,8 @@ def _row(part: pd.DataFrame) -> dict[str, Any]:
         f"{name}_interval": None if low is None or high is None else f"{low:.2f} – {high:.2f}".replace("-", "−")
         for name, (low, high) in zip(sides, intervals, strict=True)
     }
+    if not only_a + only_b:  # every resample is the same, which is no certainty
+        means["failure_pct_interval"] = None
     signs = failed[0].astype(int) - failed[1].astype(int)
     p = sign_flip_p(signs, clusters[carried].to_numpy()) if sample else None
     return {"n": len(scored), "only_a": only_a, "only_b": only_b, "p": p, **means}

@@ -218,8 +218,11 @@ def test_cars_with_several_cases_get_a_clustered_interval():
     assert row["cluster_high_pct"] - row["cluster_low_pct"] > row["ci_high_pct"] - row["ci_low_pct"] - 5
     single = summarise(frame(*(one | {"car": one["case"]} for one in rows)), {}).iloc[0]
     assert pd.isna(single["cluster_low_pct"])
-    half = [one | {"failed": i % 2 == 0, "censored": i % 2 == 1} for i, one in enumerate(rows)]
-    assert summarise(frame(*half), {}).iloc[0]["cluster_low_pct"] == 100.0  # what is censored does not count
+    half = [one | {"failed": i % 4 == 0, "censored": i % 2 == 1} for i, one in enumerate(rows)]
+    assert summarise(frame(*half), {}).iloc[0]["cluster_high_pct"] > 60.0  # of 50 %: what is censored does not count
+    none = summarise(frame(*(one | {"failed": False} for one in rows)), {}).iloc[0]
+    assert pd.isna(none["cluster_high_pct"])  # not 0 to 0
+    assert none["ci_high_pct"] > 8.0
     assert single["distance_low_m"] == single["distance_high_m"] == 10.0
 
 

@@ -347,14 +347,17 @@ def _summary(key: dict[str, str], totals: Totals, cycle_us: Mapping[str, tuple[f
 
 
 def _intervals(totals: Totals, sample: bool) -> dict[str, Any]:
-    """Bootstrap intervals over merging cars: of the failure rate where a car has several cases, and of D."""
+    """Bootstrap intervals over merging cars: of the failure rate where a car has several cases, and of D.
+
+    Where no case failed, or all did, every resample is the same and its interval would claim certainty: there is none.
+    """
     names = ("cluster_low_pct", "cluster_high_pct", "distance_low_m", "distance_high_m")
     if not sample:
         return {"cars": None, **dict.fromkeys(names)}
     clusters = totals.clusters
     cars = clusters.number
     rate, distance = clusters.intervals()
-    if cars == clusters.rows:
+    if cars == clusters.rows or rate[0] == rate[1]:
         rate = (None, None)
     ends = (None if end is None else round(end, 4) for end in (*rate, *distance))
     return {"cars": cars if totals.logged else None, **dict(zip(names, ends, strict=True))}

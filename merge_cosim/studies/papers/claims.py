@@ -70,7 +70,7 @@ def _pgm_is_best(evidence: Evidence) -> Verdict:
         leads.append(lead)
         lines.append(
             f"{TESTS[scenario]}: pgm {rates['pgm']:.1f} %, lowest of the rivals {rates[best]:.1f} % ({best}), "
-            f"pgm's lead {_interval(lead)} points"
+            + (f"pgm's lead {_interval(lead)} points" if any(lead) else "no case on which only one of the two fails")
         )
     return Verdict(_word(leads), "; ".join(lines))
 
