@@ -27,7 +27,9 @@ def parameters(argument: str) -> str:
     role, name = argument.split()
     cls = REGISTRIES[role][name]
     values = defaults(cls)
-    rows = [[f"`{name}.{key}`", f"`{values[key]}`", meaning] for key, meaning in meanings(cls).items()]
+    rows = [
+        [f"`{name}.{key}`", f"`{values[key]}`", meaning.replace("|", r"\|")] for key, meaning in meanings(cls).items()
+    ]
     return table(["parameter", "default", "meaning"], rows, left=3) if rows else "No parameters.\n"
 
 

@@ -93,6 +93,7 @@ def arrival_figure(model: IntentionModel, uniform: float = Pgm().uniform) -> Fig
         for ax in axes:
             ax.plot([0, LONGEST_TIME], [0, LONGEST_TIME], color=colors.GREY, lw=0.8, ls=":")
             ax.grid(False)
+            ax.set(xticks=range(0, int(LONGEST_TIME), 2), yticks=range(0, int(LONGEST_TIME) + 1, 2))
         figure.supxlabel("host's time to arrival $T_h$ [s]", fontsize=9)
         figure.supylabel("merging car's $T_m$ [s]", fontsize=9)
     return figure
