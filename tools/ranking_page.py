@@ -53,7 +53,7 @@ The papers state none of the five. No default of the project was chosen from thi
 
 ![Failure rates of the methods that learn nothing](img/ranking.png)
 
-![Failure rates of the methods that learn](img/ranking-learned.png)
+[![Failure rates of the methods that learn (large)](img/ranking-learned.png)](img/ranking-learned.png)
 
 Failures in per cent; bold: the default. A row of maps per meaning of 'ahead', a column per method and choice of its own
 (iPCB's weight, the model of the learned methods), all of one scale.
