@@ -9,6 +9,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.machinery import ExtensionFileLoader
+from types import FrameType
 from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,7 +27,8 @@ LATER = 0.02
 def interrupted_once(end: Callable[[], object] = lambda: None) -> None:
     """Let the first Ctrl-C raise KeyboardInterrupt, and a later one end this process at once, with status 130.
 
-    Where Python can only print an exception, as in a finalizer or in what runs after a fork, the first comes again.
+    Where Python can only print an exception, as in a finalizer or in what runs after a fork, the first comes again; so
+    it does while an extension module is being loaded, which may drop it.
 
     Args:
         end: What else a later one ends.
@@ -33,11 +36,13 @@ def interrupted_once(end: Callable[[], object] = lambda: None) -> None:
     first: list[float] = []
     printed = sys.unraisablehook
 
-    def interrupted(*_: object) -> None:
-        if not first:
+    def interrupted(_: int, frame: FrameType | None) -> None:
+        if not first and _amid_extension(frame):
+            come_again()
+        elif not first:
             first.append(time.monotonic())
             raise KeyboardInterrupt
-        if time.monotonic() - first[0] > SAME:
+        elif time.monotonic() - first[0] > SAME:
             end()
             os._exit(130)
 
@@ -46,6 +51,9 @@ def interrupted_once(end: Callable[[], object] = lambda: None) -> None:
             printed(found)
             return
         first.clear()
+        come_again()
+
+    def come_again() -> None:
         main = threading.main_thread().ident
         again = threading.Timer(LATER, lambda: signal.pthread_kill(main or 0, signal.SIGINT))
         again.daemon = True
@@ -54,6 +62,14 @@ def interrupted_once(end: Callable[[], object] = lambda: None) -> None:
     if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, interrupted)
         sys.unraisablehook = lost
+
+
+def _amid_extension(frame: FrameType | None) -> bool:
+    """Whether a module that is not Python's is being loaded."""
+    loads = (ExtensionFileLoader.create_module.__code__, ExtensionFileLoader.exec_module.__code__)
+    while frame is not None and frame.f_code not in loads:
+        frame = frame.f_back
+    return frame is not None
 
 
 @contextmanager

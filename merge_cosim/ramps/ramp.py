@@ -241,7 +241,7 @@ def parsed_net(path: Path, named: Path) -> sumolib.net.Net:
     """Parse a net; `named` is the file in error lines.
 
     Raises:
-        UserError: It cannot be parsed, or lacks a junction that an edge names.
+        UserError: It cannot be parsed, or lacks a junction that an edge names, or its offset is not two numbers.
     """
     try:
         net = sumolib.net.readNet(str(path))
@@ -250,4 +250,11 @@ def parsed_net(path: Path, named: Path) -> sumolib.net.Net:
     for node in net.getNodes():
         if node.getCoord3D() is None:
             raise UserError(f"{named}: not a whole SUMO net: it has no junction '{node.getID()}', which an edge names")
+    offset = net._location.get("netOffset", "0,0")
+    try:
+        east, north = map(float, offset.split(","))
+    except ValueError:
+        east = north = math.nan
+    if not math.isfinite(east + north):
+        raise UserError(f"{named}: not a SUMO net: the netOffset of its location is '{offset}', not two numbers")
     return net

@@ -47,6 +47,15 @@ ALONE = "import os, signal, sys, time; from merge_cosim.core import signals; str
             0,
             "heard\n",
         ),
+        # While an extension module is being loaded, which drops what is raised.
+        (
+            "signals.interrupted_once()\nimport abc, numpy\nregister = abc.ABCMeta.register\n"
+            "def once(*both):\n  abc.ABCMeta.register = register; strike(); return register(*both)\n"
+            "abc.ABCMeta.register = once\nimport lxml.etree\nprint(abc.ABCMeta.register is register, flush=True)\n"
+            "try: time.sleep(20)\nexcept KeyboardInterrupt: print('heard')",
+            0,
+            "True\nheard\n",
+        ),
         # While the command line is being loaded.
         (
             "import merge_cosim.__main__ as program\nclass Finder:\n  def find_spec(self, name, *_):\n"
@@ -55,7 +64,7 @@ ALONE = "import os, signal, sys, time; from merge_cosim.core import signals; str
             "",
         ),
     ],
-    ids=["twice", "finalizer", "loading"],
+    ids=["twice", "finalizer", "extension", "loading"],
 )
 def test_an_interrupt_is_heard_once_and_leaves_no_traceback(script: str, status: int, printed: str) -> None:
     done = subprocess.run(

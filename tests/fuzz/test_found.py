@@ -220,6 +220,14 @@ def test_a_condition_with_a_part_of_constants(tmp_path: Path) -> None:
     assert merge_cosim("cases", "out", "--where", "0 <= delay_s < 5", cwd=tmp_path).returncode == 0
 
 
+@pytest.mark.parametrize("offset", ["1e999", "1e999,0.00", "0,1,2", "", "a,b"])
+def test_a_net_whose_offset_is_not_two_numbers(tmp_path: Path, offset: str) -> None:
+    net = (shipped("sumo_nets") / "us101" / "us101.net.xml").read_text()
+    (tmp_path / "my.net.xml").write_text(re.sub('netOffset="[^"]*"', f'netOffset="{offset}"', net, count=1))
+    line = refused("ramp", "new", "mine", "--from-net", "my.net.xml", cwd=tmp_path)
+    assert f"the netOffset of its location is '{offset}', not two numbers" in line
+
+
 def test_a_net_without_a_junction(tmp_path: Path) -> None:
     net = (shipped("sumo_nets") / "us101" / "us101.net.xml").read_text().splitlines()
     (tmp_path / "my.net.xml").write_text("\n".join(line for line in net if '<junction id="main_end"' not in line))
