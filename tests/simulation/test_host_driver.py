@@ -58,6 +58,7 @@ def test_certainty_is_a_number():
             "gives NaN for a host at -60.00 m and 24.00 m/s, a merging car at -90.00 m",
         ),
         (np.float64(1.0), r"gives shape \(\) where shape \(2,\) is due"),
+        (np.array(["a", "b"]), r"gives array\(\['a', 'b'\], dtype='<U1'\), where 2 numbers are due"),
         (np.ones((2, 2)), r"gives shape \(2, 2\) where shape \(2,\) is due"),
     ],
 )

@@ -387,6 +387,26 @@ def test_a_window_is_shown_what_is_believed():
     assert shown.seen[0] == [-np.inf, -np.inf]
 
 
+class Rash(Acc):
+    """Commands more than its bounds allow."""
+
+    name = "rash"
+
+    def command(self, seen, log_odds, target):
+        return np.full(len(seen.host_speed), 5.0)
+
+
+@pytest.mark.parametrize("commanded", [True, False])
+def test_a_host_that_leaves_the_bounds_of_its_method_is_noted_where_the_method_drives_it(commanded):
+    encounters, rules = past_the_point([3, 4, 2])
+    world = ClosedFormWorld(2)
+    world.commanded = commanded
+    found = Loop(world, encounters, HostDriver(AlwaysGo(), Rash()), Designed(), rules, Setting()).run()
+    assert {name: where.tolist() for name, where in found.broken.items()} == (
+        {"acceleration": [True] * 3} if commanded else {}
+    )
+
+
 def test_the_seed_is_the_worlds():
     world, driver = Passing(), HostDriver(AlwaysGo(), Steady())
     Loop(world, None, driver, Same(), Rules(), Setting())
