@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import importlib
 import json
 import os
 import random
@@ -18,17 +19,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-import hypothesis  # noqa: F401  what takes long to import is here once, for all mutants
-import pandas as pd  # noqa: F401
-import pyarrow.parquet as pq  # noqa: F401
 import pytest
-import scipy.stats  # noqa: F401
-import sklearn.mixture  # noqa: F401
-from cosmic_ray.commands import init
-from cosmic_ray.mutating import use_mutation
-from cosmic_ray.plugins import get_operator
-from cosmic_ray.work_db import use_db
 
+LARGE = ("hypothesis", "pandas", "pyarrow.parquet", "scipy.stats", "sklearn.mixture")
+"""What takes long to import: it is, once, for all mutants."""
 CORE = {
     "scoring": (
         ["scoring/scoring.py", "scoring/rules.py", "scoring/decisions.py"],
@@ -55,6 +49,11 @@ LIMIT = 240
 
 def score(part: str, sample: int, seed: int) -> dict[str, object]:
     """Run a sample of the mutants of one part, in a copy of the repository, which is the current folder."""
+    from cosmic_ray.commands import init
+    from cosmic_ray.mutating import use_mutation
+    from cosmic_ray.plugins import get_operator
+    from cosmic_ray.work_db import use_db
+
     modules, tests = CORE[part]
     with use_db(f"{part}.sqlite") as base:
         init([Path("merge_cosim") / module for module in modules], base, {})
@@ -116,6 +115,8 @@ def main() -> None:
         os.chdir(copy)
         sys.path.insert(0, str(copy))
         os.environ |= {"PYTHONPATH": str(copy), "MERGE_COSIM_CACHE": str(Path(scratch) / "cache")}
+        for library in LARGE:
+            importlib.import_module(library)
         for part in parts:
             found[part] = score(part, given.sample, given.seed)
             print(json.dumps({part: found[part]}), file=sys.stderr, flush=True)

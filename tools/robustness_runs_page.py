@@ -17,6 +17,8 @@ from blocks import fill_page, page_parser, table
 from faults import FAULTS
 from mutation import CORE
 
+from merge_cosim.results.statistics.rates import wilson
+
 KINDS = ("right", "refused", "wrong", "traceback", "line", "hang", "crash", "process")
 
 
@@ -66,19 +68,28 @@ def _only(run: dict[str, Any]) -> str:
     return f" --only {','.join(run['kinds'])}" if set(run["kinds"]) < {kind.__name__ for kind in FAULTS} else ""
 
 
-def mutation(found: dict[str, Any]) -> str:
-    """The command, the score of each part, and what survived."""
-    most = max(part["run"] for part in found["parts"].values())
-    only = f" --only {','.join(found['parts'])}" if len(found["parts"]) < len(CORE) else ""
-    command = f"python tools/mutation.py --sample {most} --seed {found['seed']}{only} > mutation.json"
-    rows = [[name, *(str(part[key]) for key in ("mutants", "run", "killed"))] for name, part in found["parts"].items()]
-    low, high = found["interval_pct"]
-    share = 100.0 * found["killed"] / found["run"]
-    text = f"Killed: {found['killed']} of {found['run']}, {share:.1f} % (95 %: {low} to {high} %)."
-    survived = [one for part in found["parts"].values() for one in part["survived"]]
+def mutation(runs: Sequence[dict[str, Any]]) -> str:
+    """The commands, the score of each part in each draw, and what survived the last one."""
+    draws: dict[int, dict[str, Any]] = {}
+    for run in runs:  # a draw may have been made in several commands
+        draws.setdefault(run["seed"], {}).update(run["parts"])
+    commands, rows = [], []
+    for seed, parts in draws.items():
+        most = max(part["run"] for part in parts.values())
+        only = f" --only {','.join(parts)}" if len(parts) < len(CORE) else ""
+        commands.append(f"python tools/mutation.py --sample {most} --seed {seed}{only}")
+        run, killed = (sum(part[key] for part in parts.values()) for key in ("run", "killed"))
+        low, high = wilson(killed, run)
+        by_part = (f"{parts[name]['killed']} of {parts[name]['run']}" if name in parts else "" for name in CORE)
+        rows.append(
+            [str(seed), *by_part, f"{killed} of {run}", f"{100.0 * killed / run:.1f}", f"{low:.1f} to {high:.1f}"]
+        )
+    mutants = ", ".join(f"{part['mutants']:,} in {name}" for name, part in parts.items())
+    survived = [one for part in parts.values() for one in part["survived"]]
     lived = "".join(f"\n- `{one.removeprefix('merge_cosim/')}`" for one in survived)
-    listed = f"\nSurvived (module, line, change):\n{lived}\n" if survived else ""
-    return f"```\n{command}\n```\n\n{table(['part', 'mutants', 'run', 'killed'], rows)}\n{text}\n{listed}"
+    listed = f"\nSurvived draw {seed} (module, line, what it was changed to):\n{lived}\n" if survived else ""
+    shown = table(["seed", *CORE, "killed", "%", "95 %"], rows)
+    return "```\n" + "\n".join(commands) + f"\n```\n\nMutants: {mutants}.\n\n{shown}\n{listed}"
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -88,15 +99,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--again", type=Path, nargs="+", help="the same, of inputs that were faults before")
     parser.add_argument("--corpus", type=Path, help="what the command has printed")
     parser.add_argument("--faults", type=Path, nargs="+", help="what the commands have printed")
-    parser.add_argument("--mutation", type=Path, help="what the command has printed")
+    parser.add_argument("--mutation", type=Path, nargs="+", help="what the commands have printed, draw by draw")
     given = parser.parse_args(argv)
     made = {}
-    for name, shown in (("fuzz", fuzz), ("again", fuzz), ("faults", faults)):
+    for name, shown in (("fuzz", fuzz), ("again", fuzz), ("faults", faults), ("mutation", mutation)):
         if files := getattr(given, name):
             made[name] = shown([json.loads(file.read_text()) for file in files])
-    for name, shown_one in (("corpus", ramps), ("mutation", mutation)):
-        if file := getattr(given, name):
-            made[name] = shown_one(json.loads(file.read_text()))
+    if given.corpus:
+        made["corpus"] = ramps(json.loads(given.corpus.read_text()))
     fill_page("robustness.md", given.docs, {"runs": made.get})
 
 

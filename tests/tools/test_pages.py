@@ -97,7 +97,7 @@ def test_what_another_model_changes():
 
 def test_robustness_runs(tmp_path):
     ends = {"same": 2, "wrong": 1}
-    part = {"mutants": 90, "run": 4, "killed": 3, "survived": ["merge_cosim/a.py:3 core/AddNot"]}
+    part = {"mutants": 90, "run": 4, "killed": 3, "survived": ["merge_cosim/a.py:3: not b"]}
     targets = {"net": {"right": 4, "refused": 3}}
     files = {
         "fuzz": {"inputs": 7, "seed": 5, "targets": targets},
@@ -105,19 +105,21 @@ def test_robustness_runs(tmp_path):
         "corpus": {"ramps": 5, "right": 3, "refused": 1, "wrong": {"loop": "wrong: no lane"}},
         "faults": {"faults": 3, "seed": 5, **ends, "kinds": {"kill": ends}},
         "mutation": {"seed": 5, "run": 4, "killed": 3, "interval_pct": [30.1, 95.4], "parts": {"loop": part}},
+        "more": {"seed": 5, "run": 4, "killed": 4, "parts": {"scoring": part | {"killed": 4, "survived": []}}},
     }
     words = ["--docs", str(tmp_path)]
     for name, found in files.items():
         (tmp_path / name).write_text(json.dumps(found))
-        words += [str(tmp_path / name)] if name == "next" else [f"--{name}", str(tmp_path / name)]
+        words += [str(tmp_path / name)] if name in ("next", "more") else [f"--{name}", str(tmp_path / name)]
     robustness_runs_page.main(words)
     text = made_like(tmp_path, "robustness.md")
     assert "python tools/fuzz.py --seed 5 --first 0 --inputs 14\n" in text  # parts in a row are one
     assert "| net | 8 | 6 | 0 |" in text
     assert "5 ramps: 3 right, 1 refused with the right reason, 1 wrong:\n\n- loop: wrong: no lane\n" in text
     assert "| `kill` | 2 | 1 |" in text
-    assert "Killed: 3 of 4, 75.0 % (95 %: 30.1 to 95.4 %)." in text
-    assert "- `a.py:3 core/AddNot`" in text
+    assert "python tools/mutation.py --sample 4 --seed 5 --only loop,scoring\n" in text
+    assert "| 5 | 4 of 4 |  |  | 3 of 4 | 7 of 8 | 87.5 | 52.9 to 97.8 |" in text
+    assert "- `a.py:3: not b`" in text
 
 
 def test_headroom(tmp_path):
