@@ -121,7 +121,14 @@ def main(argv: Sequence[str] | None = None) -> None:
 def swept(methods: Sequence[str], settings: dict[str, object], model: str | None = None) -> pd.DataFrame:
     """The failure rates of a sweep of Designed Test II; the model is that of the designed tests if none is given."""
     results = mc.sweep(
-        "designed-2", list(methods), model=model, settings=settings, world="closed-form", jobs=1, progress=False
+        "designed-2",
+        list(methods),
+        model=model,
+        settings=settings,
+        world="closed-form",
+        jobs=1,
+        traces=0,
+        progress=False,
     )
     columns = ["method", "n", "censored", "host_not_reached", "failure_pct"]
     return results.summary()[columns].assign(weight=np.nan, model="")

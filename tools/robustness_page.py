@@ -28,7 +28,7 @@ SENSING = (
 SHIFTED = ("sweep", "designed-3", "shifted", "--world", "closed-form", "--method", "acc,slot-time,pgm,ipcb,oracle-best")
 LATE, NOISY = "sensing.delay=0.5", "sensing.speed_sigma=0.5"
 """Errors that the page's first lines tell."""
-SHORT = ("--set", "encounters.count=8", "--jobs", "1")
+SHORT = ("--set", "encounters.count=8", "--jobs", "1", "--traces", "0")
 
 
 def summary_of(words: Sequence[str], short: bool, folder: Path | None) -> pd.DataFrame:

@@ -21,7 +21,7 @@ from merge_cosim.sweeps.task import Task
 
 Traces: TypeAlias = Literal["all", "failed", "telling"] | int | None
 """Cases of each scenario that are recorded: all; those that fail under a method; those on which the methods disagree
-(no more than `MOST_DISAGREEING`); a number of them, those of disagreement first. None: a few of
+(no more than `MOST_DISAGREEING`); a number of them, 0 for none, those of disagreement first. None: a few of
 disagreement, and none of living traffic, whose scenes would have to be run again."""
 MOST_DISAGREEING = 200
 A_FEW, ONE_IN = 12, 50
@@ -41,7 +41,7 @@ def parse_traces(text: str | int | None) -> Traces:
     match text:
         case "all" | "failed" | "telling" | None:
             return text
-    if str(text).isdecimal() and int(str(text)) > 0:
+    if str(text).isdecimal():
         return int(str(text))
     raise UserError(f"--traces {text}: give all, failed, telling, or a number of cases")
 
@@ -94,7 +94,7 @@ def _recorded(wanted: Traces, tasks: Sequence[Task], folder: ResultFolder, earli
         if scenario not in chosen:
             before = earlier.loc[earlier["scenario"] == scenario, "case"].drop_duplicates().tolist()
             rows = (batch.to_pandas() for batch in folder.rows.batches(scenario, "", COLUMNS))
-            new = [] if before and wanted is None else choose(rows, wanted)
+            new = [] if wanted == 0 or (before and wanted is None) else choose(rows, wanted)
             chosen[scenario] = list(dict.fromkeys([*before, *new]))
         places: dict[str, int] = {}
         for case in chosen[scenario]:

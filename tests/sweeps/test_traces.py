@@ -108,7 +108,11 @@ def test_a_page_takes_as_many_cases_as_it_has_room_for_from_every_scenario():
     assert left_out == 32 - 6
 
 
-@pytest.mark.parametrize("wrong", ["some", "0", "-1", "1.5"])
+def test_nothing_is_recorded_where_nothing_is_wanted(tmp_path):
+    assert swept(tmp_path / "out", ["acc", "always-go"], traces=0).traces.empty
+
+
+@pytest.mark.parametrize("wrong", ["some", "-1", "1.5"])
 def test_another_wish_is_one_line(tmp_path, wrong):
     with pytest.raises(mc.UserError, match=r"give all, failed, telling, or a number of cases"):
         swept(tmp_path / "out", traces=wrong)
