@@ -117,7 +117,7 @@ def sweep(
     add: Annotated[bool, typer.Option("--add", help="Add methods, scenarios or cases to the sweep there.")] = False,
     traces: Annotated[
         str | None,
-        typer.Option(metavar="all|failed|telling|N", help="Cases to record for the viewer, 0 for none; a few by default."),
+        typer.Option(metavar="all|failed|telling|N", help="Cases to record for the viewer; by default a few."),
     ] = None,
     wide: Wide = False,
     columns: Columns = None,
