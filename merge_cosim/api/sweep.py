@@ -74,7 +74,8 @@ def sweep(
             are then those of one sweep of all. Without `methods`, those that it holds.
         traces: Cases of each scenario that are recorded cycle by cycle, to be watched in the report: `"all"`,
             `"failed"`, `"telling"` (the methods disagree; up to 200), or a number, those of disagreement
-            first, 0 for none. A few of these, if not given. With `add` and nothing else new, traces are added to a finished sweep.
+            first, 0 for none. A few of these, if not given. With `add` and nothing else new, traces are added to a
+            finished sweep.
         unchecked_ramp: Run on a ramp that does not pass `ramp check`, too, which is refused otherwise.
         progress: Show how far the sweep is, on standard error.
 
