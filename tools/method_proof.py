@@ -77,7 +77,15 @@ ABLATIONS: list[dict[str, Any]] = [
     {"rollout.escape_grades": 1},
     {"rollout.last_overlap": 8.0},
 ]
-FRONT: list[dict[str, Any]] = [{"rollout.tolerated_risk": risk} for risk in (0.0, 0.001, 0.01, 0.02, 0.1, 1.0)]
+STRICT: dict[str, Any] = {"rollout.tolerated_risk": 0.0}
+FASTEST = STRICT | {f"rollout.{cost}": 0.0 for cost in ("overlap", "last_overlap", "effort", "sudden", "commitment")}
+"""Only the time to the goal has a cost: what keeping the escape takes by itself."""
+FRONT: list[dict[str, Any]] = [
+    STRICT,
+    *({"rollout.tolerated_risk": risk} for risk in (0.001, 0.01, 0.02, 0.1, 1.0)),
+    STRICT | {"rollout.escape_braking": 3.0, "rollout.escape_acceleration": 2.0},
+    FASTEST,
+]
 STUDIES = {
     "designed": Study(["designed-2"], RIVALS),
     "narrow": Study(["designed-2"], RIVALS, [NARROW]),
@@ -200,7 +208,7 @@ def traced(scenario: str, kept: str, settings: dict[str, Any], data: Path | None
 def escapes(short: bool) -> str:
     """How often there is an escape in Designed Test III, and who fails with and without one at the start."""
     rows = []
-    for settings in FRONT[0], {}:
+    for settings in STRICT, {}:
         given = settings | (SHORT["designed-3"] if short else {})
         cases, cycles = traced("designed-3", "all", given, None)
         share = cycles["escape_share"].dropna()

@@ -112,3 +112,47 @@ def test_the_constants_of_the_filter_are_those_of_first_order_noise():
     rho = np.exp(-0.1)
     innovation = np.sqrt(0.09 * (1 - rho**2) + 0.01)
     assert found._filter_law == pytest.approx(FilterLaw(rho, 0.3, innovation, 2.4, 0.05, 1 - rho, 0.005))
+
+
+def test_the_filter_is_that_of_numpy():
+    """Levels of roughness, reaction, changes and outliers, once more with arrays over hypotheses."""
+    n, rng = 8, np.random.default_rng(1)
+    found = Interactive()
+    found.start(n, Setting(29.0))
+    f, kinds, traits = found._filter_law, found._kinds, found._traits
+    weight = np.stack([np.tile(found._prior, (n, 1)), np.zeros((n, len(kinds)))], axis=1)
+    level = np.full((n, found.roughness_levels), 1.0 / found.roughness_levels)
+    off, evidence, last, expected = np.zeros_like(weight), np.zeros(n), None, None
+    host, station, host_speed, speed = (rng.uniform(low, high, n) for low, high in (*2 * [(-90, -60)], *2 * [(10, 28)]))
+    for age in range(60):
+        odds = found.update(Observation(host, host_speed, station, speed, np.full(n, 5.0), np.full(n, 5.0)))
+        if last is not None:
+            weight = np.stack([weight[:, 0] * (1 - f.reacts), weight[:, 1] + weight[:, 0] * f.reacts], axis=1)
+            weight += f.changes * (found._prior * weight.sum(axis=2, keepdims=True) - weight)
+            level = 0.99 * level / level.sum(axis=1, keepdims=True) + 0.01 / level.shape[1]
+            means = np.stack([np.zeros_like(expected), expected], axis=1)
+            now = ((speed - last) / 0.1)[:, None, None] - means
+            e = now if age == 1 else now - f.keep * off
+            s = (np.hypot(f.sigma, f.innovation) if age == 1 else f.innovation) * f.rougher ** np.arange(4)
+            density = np.exp(-0.5 * (e[..., None] / s) ** 2) / (s * np.sqrt(2 * np.pi))
+            density = (1 - f.outlier) * density + f.outlier * 0.1
+            by_level = (weight[..., None] * density).sum(axis=(1, 2))
+            weight = weight * (density * level[:, None, None, :]).sum(axis=-1)
+            total, off = weight.sum(axis=(1, 2)), now
+            level = level * by_level / total[:, None]
+            evidence += np.where(np.maximum(host, station) < 0, np.log(total), 0.0)
+            weight /= total[:, None, None]
+        beliefs = np.stack([weight[:, :, kinds == kind].sum(axis=(1, 2)) for kind in range(len(DRIVER_TYPES))], axis=1)
+        np.testing.assert_allclose(found.beliefs, beliefs, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(found.evidence, evidence, rtol=1e-9, atol=1e-9)
+        assert np.isfinite(odds).all()
+        states = zip(host, host_speed, station, speed, strict=True)
+        expected = [
+            [reacting(k, t, h, v, 5.0, s, u, LAW) for k, t in zip(kinds, traits, strict=True)] for h, v, s, u in states
+        ]
+        expected = np.minimum(expected, np.maximum((29.0 - speed) / 0.1, 0.0)[:, None])
+        expected = np.maximum(expected, np.minimum(-speed / 0.1, 0.0)[:, None])
+        last = speed.copy()
+        speed = np.clip(speed + rng.normal(0, 0.05 * (1 + np.arange(n)), n), 0, 29)
+        host, station = host + host_speed * 0.1, station + speed * 0.1
+    assert level.argmax(axis=1).min() < level.argmax(axis=1).max()  # drivers of different roughness
