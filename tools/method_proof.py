@@ -86,6 +86,10 @@ FRONT: list[dict[str, Any]] = [
     STRICT | {"rollout.escape_braking": 3.0, "rollout.escape_acceleration": 2.0},
     FASTEST,
 ]
+ERRORS = [("speed_sigma", 0.5), ("station_sigma", 1.0), ("delay", 0.3)]
+SENSING: list[dict[str, Any]] = [
+    {f"sensing.{name}": size for name, size in some} for some in (*[[e] for e in ERRORS], ERRORS)
+]
 STUDIES = {
     "designed": Study(["designed-2"], RIVALS),
     "narrow": Study(["designed-2"], RIVALS, [NARROW]),
@@ -95,6 +99,7 @@ STUDIES = {
     "shifted": Study(["shifted"], ["interactive", *OTHERS]),
     "shifted-seeds": Study(["shifted"], ["interactive", "slot-time", "ipcb"], [{"encounters.seed": 5}]),
     "replay": Study(["us101-replay"], [*RIVALS, "human"], logged=True),
+    "sensing": Study(["designed-3"], ["interactive", *OTHERS], SENSING),
     "planners": Study(["designed-3"], ["interactive", *PLANNERS, "oracle-label+rollout"]),
     "ablations": Study(["designed-3"], ["interactive"], ABLATIONS),
     "front": Study(["designed-3"], ["interactive"], FRONT),
