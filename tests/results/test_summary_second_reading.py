@@ -12,8 +12,8 @@ from scipy.stats import fisher_exact
 from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics import strata, summarise
 from merge_cosim.results.statistics.rates import percent, wilson
-from merge_cosim.results.statistics.summary import MEANS, QUANTILES, is_sample, is_sample_source
-from merge_cosim.results.statistics.verdict import verdict
+from merge_cosim.results.statistics.summary import MEANS, QUANTILES, is_sample, is_sample_source, with_all_sites
+from merge_cosim.results.statistics.verdict import verdict, verdicts
 
 NUMBERS = ("distance_m", "gap_m", "delay_s", "hardest_braking", "mean_jerk", "human_station_rms_m", "human_speed_rms")
 NUMBERS += ("min_ttc_s", "max_drac", "pet_s", "min_leader_gap_m", "min_leader_ttc_s", "min_follower_gap_m")
@@ -243,3 +243,36 @@ def test_who_is_beyond_chance_and_who_is_not():
     assert verdict(rows_of("traffic", **all_open)).sentence.endswith(
         "All differences from a are undecided (p ≥ 0.05, Holm)."
     )
+
+
+def test_methods_that_tie_under_every_model_are_undecided_and_so_are_those_without_a_common_model():
+    same = [(40, 1, 1.0, "k"), (40, 3, 1.0, "m")]
+    assert verdict(rows_of("designed", a=same, b=same)).undecided == ("b",)
+    apart = rows_of("designed", a=[(40, 1, 1.0, "k")] * 2, b=[(40, 9, 1.0, "m")] * 2)
+    assert verdict(apart).undecided == ("b",)
+
+
+def test_a_verdict_is_on_the_rows_of_its_own_scenario():
+    def rows(scenario, bad):
+        same = {"scenario": scenario, "variation": "", "site": "x", "source": "random", "model": "", "car": ""}
+        same |= {"censored": False, "stuck": False}
+        return [
+            same | {"method": method, "case": f"{case}", "failed": case < failures}
+            for method, failures in (("a", 0), ("b", bad))
+            for case in range(40)
+        ]
+
+    summary = rows_of("random", a=[(40, 0, 1.0, "")], b=[(40, 9, 1.0, "")]).assign(variation="")
+    both = pd.concat([summary, summary.assign(scenario="t")])
+    found = verdicts(both, pd.DataFrame(rows("s", 9) + rows("t", 2)))
+    assert [one.undecided for one in found.values()] == [(), ("b",)]
+
+
+def test_all_sites_are_added_where_a_scenario_has_several_of_one_source():
+    def frame(*sites_and_sources):
+        return pd.DataFrame([{"scenario": "s", "site": site, "source": source} for site, source in sites_and_sources])
+
+    several = frame(("x", "ngsim"), ("y", "ngsim"))
+    assert with_all_sites(several)["site"].tolist() == ["x", "y", "all", "all"]
+    for one in (frame(("x", "ngsim"), ("x", "ngsim")), frame(("x", "ngsim"), ("y", "surrogate"))):
+        assert with_all_sites(one).equals(one)

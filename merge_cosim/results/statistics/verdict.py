@@ -158,10 +158,10 @@ def _undecided(standings: Sequence[_Standing], rows: pd.DataFrame | None, sample
 
 
 def _p_value(first: _Standing, other: _Standing, rows: pd.DataFrame | None, sample: bool) -> float:
-    """The largest p value over common models; 1 where models disagree on which method is better; 0 on a grid."""
+    """The largest p value over common models; 1 where these disagree on the better method or are none; 0 on a grid."""
     pairs = [(a, b) for a in first.counts for b in other.counts if a.model == b.model or not (a.model and b.model)]
     signs = {bool(a.share < b.share) for a, b in pairs if a.share != b.share}
-    if len(pairs) > 1 and len(signs) != 1:
+    if len(pairs) != 1 and len(signs) != 1:
         return 1.0
     if not sample:
         return 0.0
