@@ -64,9 +64,12 @@ def _parquet_blocks(source: Source, columns: list[str]) -> Iterator[_Block]:
     """Yield the number of its first row (from 1) and the rows of each block of a Parquet file."""
     first = 1
     try:
-        for batch in pq.ParquetFile(source.path).iter_batches(BLOCK_ROWS, columns=columns):
+        file = pq.ParquetFile(source.path)
+        for batch in file.iter_batches(BLOCK_ROWS, columns=columns):
             yield first, pa.Table.from_batches([batch])
             first += batch.num_rows
+        if first != file.metadata.num_rows + 1:  # with a wrong number in a column's metadata there are no batches
+            raise pa.ArrowInvalid
     except (pa.ArrowInvalid, OSError):
         raise UserError(f"{source}: damaged or cut short: download or copy it again") from None
 

@@ -31,6 +31,18 @@ def test_a_short_row_with_bytes_that_are_no_text(tmp_path: Path) -> None:
     assert "t.csv, from line 2 on: CSV parse error" in refused("ngsim", "summary", "t.csv", cwd=tmp_path)
 
 
+def test_a_parquet_file_with_a_column_of_minus_192_values(tmp_path: Path) -> None:
+    file = tmp_path / "t.parquet"
+    pq.write_table(trajectory_table(), file)
+    content = bytearray(file.read_bytes())
+    number = content.index(b"\x16\xc0\x02", content.rindex(b"Location"))  # 160 in its metadata
+    content[number + 1] = 0xFF
+    file.write_bytes(content)
+    column = pq.read_metadata(file).row_group(0).column(trajectory_table().column_names.index("Location"))
+    assert column.num_values == -192
+    assert "t.parquet: damaged or cut short" in refused("ngsim", "import", "t.parquet", "--out", "o", cwd=tmp_path)
+
+
 def test_a_clock_that_is_no_time(tmp_path: Path) -> None:
     text = trajectories("  ", False)
     for clock in (b"99999999999999999999", b"-5", b"1118846978900000"):
