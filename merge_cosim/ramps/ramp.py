@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -41,7 +42,7 @@ class Section:
     start: float
     length: float
 
-    @property
+    @cached_property
     def end(self) -> float:
         """X of its end [m]."""
         return round(self.start + self.length, 9)  # nanometres, so that edges end exactly at the gore
@@ -101,12 +102,12 @@ class Ramp:
             ngsim=file.ngsim,
         )
 
-    @property
+    @cached_property
     def changes_lane(self) -> bool:
         """Whether the merging car changes lane at the merging point (else the ramp joins by a connection)."""
         return self.ramp[-1].end > 0.0
 
-    @property
+    @cached_property
     def auxiliary_end(self) -> float:
         """X where the auxiliary lane ends [m]; inf if there is none."""
         return self.ramp[-1].end if self.changes_lane else math.inf

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from enum import Enum
 from functools import cached_property
 from itertools import pairwise
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.units import FloatArray
+from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.ramps.ramp import Ramp, Way
 
 _TILE = re.compile(r"(t\d+)\.(.+)")
@@ -181,11 +182,13 @@ class AlongPaths:
         self._edge_start = self._starts[self._edge]
         self._position = np.zeros(2 * count)
 
-    def put(self, row: int, where: LanePosition) -> None:
-        """Note that a car was placed."""
-        self._edge[row] = self._numbers[row // self._count][where.edge]
-        self._edge_start[row] = self._starts[self._edge[row]]
-        self._position[row] = where.position
+    def put(self, rows: IntArray, where: Sequence[LanePosition]) -> None:
+        """Note that cars on one of the paths were placed, one at each of `rows`."""
+        numbers = self._numbers[rows[0] // self._count]
+        edge = [numbers[one.edge] for one in where]
+        self._edge[rows] = edge
+        self._edge_start[rows] = self._starts[edge]
+        self._position[rows] = [one.position for one in where]
 
     def x(self, position: FloatArray) -> FloatArray:
         """X of all cars [m] from their lane positions after a step, shape (2 count,) both."""

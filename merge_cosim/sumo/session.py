@@ -96,11 +96,14 @@ class Session:
         self.lane: Callable[[str], str] = vehicle.getLaneID
         self.lane_position: Callable[[str], float] = vehicle.getLanePosition
         self.speed: Callable[[str], float] = vehicle.getSpeed
+        self._move_to: Callable[[str, str, float], object] = vehicle.moveTo
+        self._set_previous_speed: Callable[[str, float], object] = vehicle.setPreviousSpeed
         if getattr(api, "__name__", "") == "libsumo":
             from libsumo import _libsumo as raw  # the raw calls spare a Python frame each
 
             self.set_speed, self.lane_position = raw.vehicle_setSpeed, raw.vehicle_getLanePosition
             self.lane, self.speed = raw.vehicle_getLaneID, raw.vehicle_getSpeed
+            self._move_to, self._set_previous_speed = raw.vehicle_moveTo, raw.vehicle_setPreviousSpeed
         self.edge: Callable[[str], str] = vehicle.getRoadID
         self.route: Callable[[str], tuple[str, ...]] = vehicle.getRoute
         self.kind: Callable[[str], str] = vehicle.getTypeID
@@ -178,9 +181,9 @@ class Session:
 
     def place(self, car: str, lane: str, position: float, speed: float | None = None) -> None:
         """Put a car's front bumper at `position` on a lane, as if it had come with `speed` (None: with its own)."""
-        self._api.vehicle.moveTo(car, lane, position)
+        self._move_to(car, lane, position)
         if speed is not None:
-            self._api.vehicle.setPreviousSpeed(car, speed)
+            self._set_previous_speed(car, speed)
 
     def change_lane(self, car: str, index: int) -> None:
         """Bring a car to the lane `index` of its edge within the next step."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import repeat
 from time import perf_counter
 
 import numpy as np
@@ -12,8 +13,7 @@ from merge_cosim.core.observation import DECIMALS
 from merge_cosim.core.units import DT, TOLERANCE, FloatArray, IntArray
 from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.simulation.worlds.base import Ended, GivenWorld
-from merge_cosim.simulation.worlds.closed_form import ClosedForm
-from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, LanePosition, Part
+from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, Part
 from merge_cosim.sumo.options import SumoOptions
 from merge_cosim.sumo.session import Car, Errors, Session
 from merge_cosim.sumo.start import LibsumoSession, one_line
@@ -81,35 +81,35 @@ class TiledWorld(GivenWorld):
         self._length = np.full(2 * slots, np.nan)
         self._in_host_lane = np.ones(slots, dtype=bool)
         self.state = np.zeros((4, slots))
-        self._closed_form = ClosedForm(slots)
+        self._closed_form = np.zeros((2, slots))
 
     def place(self, slots: IntArray, cases: IntArray) -> FloatArray:
         """See `GivenWorld`."""
         start = self.encounters.start[:, cases]
-        self.state[:, slots] = self._closed_form.state[:, slots] = start[:4]
+        self.state[:, slots] = start[:4]
+        self._closed_form[:, slots] = start[:2]
         self._in_host_lane[slots] = not self.ramp.changes_lane
         merge_position = self.encounters.merge_position[cases]
         for car, path in enumerate(self._paths):
             rows = slots + car * self.slots
             self._merge_position[rows] = merge_position
-            values = zip(rows.tolist(), merge_position.tolist(), *start[car::2].tolist(), strict=True)
-            for row, position, station, speed, length in values:
-                self._place(row, self._lanes.place(path, station, position), speed, length)
+            station, speed, length = start[car::2]
+            where = [*map(self._lanes.place, repeat(path), station.tolist(), merge_position.tolist())]
+            self._along.put(rows, where)
+            for row, one, own_speed in zip(rows.tolist(), where, speed.tolist(), strict=True):
+                lane = self._id(row % self.slots, f"{one.edge}_{one.lane}")
+                self.session.place(self._names[row], lane, one.position, own_speed)
+            for other in np.flatnonzero(self._length[rows] != length).tolist():
+                self.session.set_length(self._names[rows[other]], float(length[other]))
+            self._length[rows] = length
         return np.empty((0, len(slots)))
-
-    def _place(self, row: int, where: LanePosition, speed: float, length: float) -> None:
-        name = self._names[row]
-        self.session.place(name, self._id(row % self.slots, f"{where.edge}_{where.lane}"), where.position, speed)
-        self._along.put(row, where)
-        if self._length[row] != length:
-            self.session.set_length(name, length)
-            self._length[row] = length
 
     def command(self, speeds: FloatArray) -> None:
         """See `World`; a car from the ramp whose front reaches the merging point in this cycle changes lane in it."""
+        way = speeds * DT
         if self.ramp.changes_lane:
-            self._change_lanes(self.state[self._by_ramp] + speeds[self._by_ramp] * DT)
-        self._closed_form.move(speeds)
+            self._change_lanes(self.state[self._by_ramp] + way[self._by_ramp])
+        self._closed_form += way
         self.session.command(self._names, speeds.ravel().tolist())
 
     def step(self) -> None:
@@ -126,9 +126,11 @@ class TiledWorld(GivenWorld):
     def ended(self, over: IntArray, age: IntArray) -> Ended | None:
         """See `World`; the stations are compared with the closed form's, in which a difference would have added up."""
         if len(over):
-            apart = np.abs(self.state[:2, over] - self._closed_form.state[:2, over]).max(axis=0)
-            self.worst_difference_m = max(self.worst_difference_m, float(apart.max()))
-            self.breaks("closed_form", over[~(apart <= TOLERANCE)])
+            apart = np.maximum(*np.abs(self.state[:2, over] - self._closed_form[:, over]))
+            largest = float(apart.max())
+            self.worst_difference_m = max(self.worst_difference_m, largest)
+            if not largest <= TOLERANCE:
+                self.breaks("closed_form", over[~(apart <= TOLERANCE)])
             self._check_lanes(over)
         return super().ended(over, age)
 
@@ -152,16 +154,19 @@ class TiledWorld(GivenWorld):
 
     def _check_lanes(self, slots: IntArray) -> None:
         """Note the encounters with a car on a lane that is not its own."""
-        by_main, by_ramp = slots + (1 - self._by_ramp) * self.slots, slots + self._by_ramp * self.slots
+        by_main, by_ramp = (1 - self._by_ramp) * self.slots, self._by_ramp * self.slots
         past = self.state[self._by_ramp, slots]  # of the place where the merging car comes onto the host's lane
         if not self.ramp.changes_lane:
-            past = past + self._merge_position[by_ramp]
-        for slot, *rows, way in zip(slots.tolist(), by_main.tolist(), by_ramp.tolist(), past.tolist(), strict=True):
-            lanes = (self._lanes[self.session.lane(self._names[row])] for row in rows)
-            on_main, merging = (lane.part if lane else None for lane in lanes)
+            past = past + self._merge_position[slots + by_ramp]
+        for slot, way in zip(slots.tolist(), past.tolist(), strict=True):
             due = Part.HOST if way > 0.0 else Part.MERGING
-            if on_main is not Part.HOST or (merging is not due and abs(way) > TOLERANCE):
+            as_due = self._part(slot + by_main) is Part.HOST
+            if not (as_due and (abs(way) <= TOLERANCE or self._part(slot + by_ramp) is due)):
                 self.breaks("lane", np.array([slot]))
+
+    def _part(self, row: int) -> Part | None:
+        lane = self._lanes[self.session.lane(self._names[row])]
+        return lane.part if lane else None
 
     def _change_lanes(self, reached: FloatArray) -> None:
         """Command the lane changes of this cycle; `reached`: stations of the cars from the ramp at its end [m]."""
@@ -183,8 +188,9 @@ class TiledWorld(GivenWorld):
         np.subtract(station, self.state[:2], out=self.state[2:])
         self.state[2:] /= DT
         self.state[:2] = station
-        for name in self._row.keys() & self.session.colliding():
-            self.collided[self._row[name] % self.slots] = True
+        if colliding := self.session.colliding():
+            for name in self._row.keys() & colliding:
+                self.collided[self._row[name] % self.slots] = True
 
 
 def _own_id(_tile: int, name: str) -> str:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 from small import small_histogram, small_model
 
 from merge_cosim.estimators.learned.histogram import (
@@ -9,6 +10,7 @@ from merge_cosim.estimators.learned.histogram import (
     TIME_BINS,
     ArrivalHistogram,
     SpeedHistogram,
+    blurred,
     speed_bin,
     time_bin,
 )
@@ -104,3 +106,8 @@ def test_with_the_roles_swapped_equal_times_say_nothing():
     np.testing.assert_allclose(odds, -odds.T, atol=1e-12)
     assert (np.diag(odds) == 0.0).all()
     assert odds[4, 10] < 0 < odds[10, 4]
+
+
+def test_smoothing_is_that_of_scipy_to_the_last_bit():
+    counts = np.random.default_rng(0).poisson(0.7, (30, 40)).astype(float)
+    assert np.array_equal(blurred(counts), gaussian_filter(counts, sigma=1.0, mode="constant"))
