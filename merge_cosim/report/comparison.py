@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from pandas.api.types import union_categoricals
+import pyarrow as pa
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order
+from merge_cosim.results.schema import SCHEMA
 from merge_cosim.results.statistics.comparison import clusters_of
 from merge_cosim.results.statistics.paired import sign_flip_p
 from merge_cosim.results.statistics.rates import bootstrap_means
-from merge_cosim.results.statistics.summary import is_sample
+from merge_cosim.results.statistics.summary import is_sample_source
 from merge_cosim.results.store import MANIFEST, ResultFolder
 from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
@@ -26,6 +28,8 @@ GROUP = ["scenario", "variation", "site", "source", "method"]
 STATES = ["host_station_0_m", "host_speed_0", "merging_station_0_m", "merging_speed_0"]
 MEASURES = {"distance_m": "D m", "delay_s": "delay s", "hardest_braking": "brake m/s²"}
 """Measures whose means are set side by side, beside the failures."""
+COLUMNS = [*GROUP, "model", "car", "failed", "censored", *STATES, *MEASURES]
+"""What is read of the rows, beside `case`."""
 SIDES = (("a", "A", 2), ("b", "B", 2), ("difference", "A − B", 2), ("interval", "95 % CI", None))
 """What is shown of a measure; the intervals are of the mean of the paired differences, over merging cars."""
 
@@ -46,24 +50,26 @@ def compare(first: Path, second: Path, methods: tuple[str, str] | None = None) -
         UserError: One of the folders holds no finished sweep, or not its method, or they share no case.
     """
     folders = [ResultFolder(path) for path in (first, second)]
-    frames = _rows(folders)
-    if methods is not None:
-        frames = [_of_method(*one) for one in zip(frames, methods, (first, second), strict=True)]
+    held = [_held(folder) for folder in folders]
+    sides = [_Side.of(*one) for one in zip(folders, held, methods or (None, None), strict=True)]
     group = GROUP if methods is None else GROUP[:-1]
-    paired = [frame[frame["source"] != TRAFFIC] for frame in frames]
-    both = paired[0].merge(paired[1], on=[*group, "case"], suffixes=("_a", "_b"))
-    starts = [both[[f"{name}_{side}" for name in STATES]].to_numpy(dtype=float) for side in "ab"]
-    same_start = np.isclose(starts[0], starts[1]).all(axis=1)  # other seeds draw cases of the same names
-    others = int((~same_start).sum())
-    both = both[same_start]
-    if both.empty:
+    found: dict[tuple[str, ...], list[pd.DataFrame]] = {}
+    others = 0
+    for both in _common(sides, [*group, "case"]):
+        starts = [both[[f"{name}_{side}" for name in STATES]].to_numpy(dtype=float) for side in "ab"]
+        same_start = np.isclose(starts[0], starts[1]).all(axis=1)  # other seeds draw cases of the same names
+        others += int((~same_start).sum())
+        for key, part in both[same_start].groupby(group, sort=False):
+            found.setdefault(key, []).append(_kept(part))
+    if not found:
         raise UserError(
             f"{first} and {second}: they have no case of the same scenario"
             + (" and method in common; DIR:METHOD DIR:METHOD compares two methods" if methods is None else " in common")
             + " (meetings in living traffic are never the same: see the intervals of each)"
         )
     rows = [
-        dict(zip(group, key, strict=True)) | _row(part) for key, part in both.groupby(group, sort=False, observed=True)
+        (names := dict(zip(group, key, strict=True))) | _row(parts, is_sample_source(names["source"]))
+        for key, parts in found.items()
     ]
     data = pd.DataFrame(rows)
     if methods is None:
@@ -89,65 +95,119 @@ def compare(first: Path, second: Path, methods: tuple[str, str] | None = None) -
         apart, title = [False] * len(data), f"A: {first}, {methods[0]}; B: {second}, {methods[1]}"
     notes = [f"{others:,} cases of the same name begin otherwise and are left out"] if others else []
     if first != second:
-        notes += _differences(folders, frames, methods is None)
+        notes += _differences(folders, held, methods is None)
     return Table.of(data, columns, apart, title), notes
 
 
-def _rows(folders: Sequence[ResultFolder]) -> list[pd.DataFrame]:
-    """What is compared of the rows of each folder, the names that repeat as categories in common."""
-    names = [*GROUP, "model"]
-    columns = [*names, "case", "car", "failed", "censored", *STATES, *MEASURES]
-    frames = [folder.results(columns).to_pandas(categories=names) for folder in folders]
-    for name in names:
-        known = union_categoricals([frame[name] for frame in frames]).categories
-        for frame in frames:
-            frame[name] = frame[name].cat.set_categories(known)
-    return frames
+def _held(folder: ResultFolder) -> pd.DataFrame:
+    """The scenarios, methods and models that a folder has rows of."""
+    folder.check()
+    names = ["scenario", "method", "model"]
+    found = (rows.select(names).group_by(names).aggregate([]) for rows in folder.rows.all_batches(names))
+    return pa.concat_tables([SCHEMA.empty_table().select(names), *found]).to_pandas().drop_duplicates()
 
 
-def _of_method(rows: pd.DataFrame, method: str, folder: Path) -> pd.DataFrame:
-    """The rows of a method, `NAME` or, where it was run with several models, `NAME@MODEL`."""
-    name, _, model = method.partition("@")
-    known = rows["method"].unique().tolist()
-    if name not in known:
-        raise UserError(f"{folder}: no method '{name}' in these results{did_you_mean(name, known)}")
-    own = rows[rows["method"] == name]
-    models = own["model"].unique().tolist()
-    if model and model not in models:
-        raise UserError(f"{folder}: no model '{model}' of '{name}' in these results{did_you_mean(model, models)}")
-    own = own[own["model"] == model] if model else own
-    if own.duplicated([*GROUP, "case"]).any():
-        raise UserError(f"{folder}: '{name}' was run with several models; write {name}@MODEL ({', '.join(models)})")
-    return own
+@dataclass(frozen=True)
+class _Side:
+    """The rows of a folder that are compared; of one method and model, or of all where these are None."""
+
+    folder: ResultFolder
+    method: str | None
+    model: str | None
+
+    @classmethod
+    def of(cls, folder: ResultFolder, held: pd.DataFrame, method: str | None) -> _Side:
+        """Of a method, `NAME` or, where it was run with several models, `NAME@MODEL`."""
+        if method is None:
+            return cls(folder, None, None)
+        name, _, model = method.partition("@")
+        known = sorted(set(held["method"]))
+        if name not in known:
+            raise UserError(f"{folder.path}: no method '{name}' in these results{did_you_mean(name, known)}")
+        models = held.loc[held["method"] == name, "model"].unique().tolist()
+        if model and model not in models:
+            hint = did_you_mean(model, models)
+            raise UserError(f"{folder.path}: no model '{model}' of '{name}' in these results{hint}")
+        return cls(folder, name, model or None)
+
+    def batches(self, scenario: str, variation: str) -> Iterator[pd.DataFrame]:
+        """The rows of a scenario and variation, in batches of whole cases that follow each other by name."""
+        for batch in self.folder.rows.batches(scenario, variation, COLUMNS):
+            rows = batch.to_pandas()
+            rows = rows[rows["source"] != TRAFFIC]
+            if self.method is not None:
+                rows = rows[rows["method"] == self.method]
+                rows = rows if self.model is None else rows[rows["model"] == self.model]
+                if rows.duplicated([*GROUP, "case"]).any():
+                    models = ", ".join(sorted(set(rows["model"])))
+                    hint = f"'{self.method}' was run with several models; write {self.method}@MODEL ({models})"
+                    raise UserError(f"{self.folder.path}: {hint}")
+            if len(rows):
+                yield rows
 
 
-def _row(part: pd.DataFrame) -> dict[str, Any]:
-    carried = ~part["censored_a"] & ~part["censored_b"]
-    scored = part[carried]
-    failed = [scored[f"failed_{side}"].to_numpy(dtype=bool) for side in "ab"]
-    only_a, only_b = (int((one & ~other).sum()) for one, other in (failed, failed[::-1]))
-    sides = {"failure_pct": [100.0 * part[f"failed_{side}"].where(carried) for side in "ab"]}
-    sides |= {name: [part[f"{name}_{side}"] for side in "ab"] for name in MEASURES}
-    differences = pd.DataFrame({name: one.astype(float) - other.astype(float) for name, (one, other) in sides.items()})
-    means: dict[str, Any] = {
-        f"{name}_{side}": one.mean() for name, pair in sides.items() for side, one in zip("ab", pair, strict=True)
-    }
-    means |= {f"{name}_difference": differences[name].mean() for name in sides}
-    sample = is_sample(part)
-    clusters = clusters_of(part.rename(columns={"car_a": "car"}))
-    intervals = bootstrap_means(differences, clusters) if sample else [(None, None)] * len(sides)
+def _common(sides: Sequence[_Side], names: list[str]) -> Iterator[pd.DataFrame]:
+    """The rows of both sides on the same cases, joined by `names`, a stretch of cases at a time."""
+    groups = [side.folder.rows.groups() for side in sides]
+    for one in groups[0]:
+        if one not in groups[1]:
+            continue
+        streams = [side.batches(*one) for side in sides]
+        ahead = [next(stream, None) for stream in streams]
+        while ahead[0] is not None and ahead[1] is not None:
+            last = min(rows["case"].iloc[-1] for rows in ahead if rows is not None)
+            now = []
+            for side, rows in enumerate(ahead):
+                assert rows is not None
+                until = int(rows["case"].searchsorted(last, side="right"))
+                now.append(rows[:until])
+                ahead[side] = rows[until:] if until < len(rows) else next(streams[side], None)
+            yield now[0].merge(now[1], on=names, suffixes=("_a", "_b"))
+
+
+def _kept(part: pd.DataFrame) -> pd.DataFrame:
+    """What the comparison of a group rests on, of some of its rows."""
+    names = [f"{name}_{side}" for name in ("failed", "censored", *MEASURES) for side in "ab"]
+    named = bool((part["car_a"] != "").any())
+    return part[names].assign(cluster=clusters_of(part.rename(columns={"car_a": "car"})) if named else None)
+
+
+def _row(parts: list[pd.DataFrame], sample: bool) -> dict[str, Any]:
+    """The comparison of a group, whose rows come in parts; a column at a time, as there may be millions of rows."""
+
+    def column(name: str) -> pd.Series:
+        return pd.concat([part[name] for part in parts], ignore_index=True)
+
+    carried = ~column("censored_a") & ~column("censored_b")
+    failed = [column(f"failed_{side}") for side in "ab"]
+    scored = [one[carried].to_numpy(dtype=bool) for one in failed]
+    only_a, only_b = (int((one & ~other).sum()) for one, other in (scored, scored[::-1]))
+    means: dict[str, Any] = {}
+    differences: dict[str, pd.Series] = {}
+    for name in ("failure_pct", *MEASURES):
+        if name == "failure_pct":
+            sides = [100.0 * one.where(carried) for one in failed]
+        else:
+            sides = [column(f"{name}_{side}") for side in "ab"]
+        means |= {f"{name}_{side}": one.mean() for side, one in zip("ab", sides, strict=True)}
+        differences[name] = sides[0].astype(float) - sides[1].astype(float)
+    means |= {f"{name}_difference": one.mean() for name, one in differences.items()}
+    names = column("cluster")
+    named = names.notna()
+    clusters = names.where(named, names.index.map(str)) if named.any() else None
+    intervals = bootstrap_means(pd.DataFrame(differences), clusters) if sample else [(None, None)] * len(differences)
     means |= {
         f"{name}_interval": None if low is None or high is None else f"{low:.2f} – {high:.2f}".replace("-", "−")
-        for name, (low, high) in zip(sides, intervals, strict=True)
+        for name, (low, high) in zip(differences, intervals, strict=True)
     }
     if not only_a + only_b:  # every resample is the same, which is no certainty
         means["failure_pct_interval"] = None
-    signs = failed[0].astype(int) - failed[1].astype(int)
-    p = sign_flip_p(signs, clusters[carried].to_numpy()) if sample else None
-    return {"n": len(scored), "only_a": only_a, "only_b": only_b, "p": p, **means}
+    signs = scored[0].astype(int) - scored[1].astype(int)
+    p = sign_flip_p(signs, None if clusters is None else clusters[carried].to_numpy()) if sample else None
+    return {"n": len(signs), "only_a": only_a, "only_b": only_b, "p": p, **means}
 
 
-def _differences(folders: list[ResultFolder], frames: list[pd.DataFrame], every: bool) -> list[str]:
+def _differences(folders: list[ResultFolder], held: list[pd.DataFrame], every: bool) -> list[str]:
     """Differences between the two sweeps that make the comparison less certain, one line each."""
     lines = []
     manifests = [folder.read_json(MANIFEST) for folder in folders]
@@ -157,8 +217,8 @@ def _differences(folders: list[ResultFolder], frames: list[pd.DataFrame], every:
             lines.append(f"{name} differ: {_differing(values[0], values[1])}")
     if not every:
         return lines
-    for folder, frame, other in zip(folders, frames, frames[::-1], strict=True):
-        mine, theirs = (set(one[["scenario", "method"]].itertuples(index=False, name=None)) for one in (frame, other))
+    for folder, own, other in zip(folders, held, held[::-1], strict=True):
+        mine, theirs = (set(one[["scenario", "method"]].itertuples(index=False, name=None)) for one in (own, other))
         only = sorted(mine - theirs)
         if only:
             lines.append(f"only in {folder.path}: " + ", ".join(f"{scenario} {method}" for scenario, method in only))

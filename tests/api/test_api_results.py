@@ -77,7 +77,7 @@ def test_a_condition_that_cannot_be_read_is_refused(results, where, message):
         results.cases(where)
 
 
-def test_two_methods_on_the_same_cases(results):
+def test_two_methods_on_the_same_cases(results, monkeypatch):
     rows = results.rows.pivot(index="case", columns="method")
     compared = results.compare("pgm", "acc").iloc[0]
     assert compared["n"] == len(rows)
@@ -86,6 +86,13 @@ def test_two_methods_on_the_same_cases(results):
     delays = (rows["delay_s", "pgm"] - rows["delay_s", "acc"]).mean()
     assert compared["delay_s_difference"] == pytest.approx(delays)
     assert results.compare("acc", "acc", other=results).iloc[0]["delay_s_difference"] == 0
+    monkeypatch.setattr(merged_rows, "BATCH_ROWS", 5)  # the same from batches that end at other cases on each side
+    monkeypatch.setattr(merged_rows, "STRETCH_ROWS", 7)
+    own = {name: float(value) for name, value in results.manifest["settings"].items()}
+    own["encounters.host_offset.step"] *= 2
+    fewer = mc.sweep(["designed-2"], methods=["acc"], settings=own, world="closed-form", jobs=1)
+    assert fewer.compare("acc", "pgm", other=results).iloc[0]["n"] == len(fewer) < len(rows)
+    pd.testing.assert_series_equal(results.compare("pgm", "acc").iloc[0], compared)
     with pytest.raises(mc.UserError, match="no method 'pmg' in these results; did you mean 'pgm'"):
         results.compare("pmg", "acc")
 

@@ -17,7 +17,7 @@ SIGN_DRAWS = 20_000
 SEED = 0
 
 
-def sign_flip_p(differences: AnyArray, clusters: AnyArray) -> float:
+def sign_flip_p(differences: AnyArray, clusters: AnyArray | None) -> float:
     """Two-sided p value of a paired test that keeps clusters together (sign-flip permutation test).
 
     If neither method is better, the sum of the differences within a cluster has either sign with the same probability.
@@ -25,10 +25,12 @@ def sign_flip_p(differences: AnyArray, clusters: AnyArray) -> float:
 
     Args:
         differences: Value of the first method minus that of the second on each case, shape (n,).
-        clusters: Which cases belong together, shape (n,).
+        clusters: Which cases belong together, shape (n,); None: none do.
     """
-    _, index = np.unique(np.asarray(clusters, dtype=str), return_inverse=True)
-    sums = np.bincount(index, np.asarray(differences, dtype=float))
+    sums = np.asarray(differences, dtype=float)
+    if clusters is not None:
+        _, index = np.unique(np.asarray(clusters, dtype=str), return_inverse=True)
+        sums = np.bincount(index, sums)
     size, observed = np.abs(sums[sums != 0]), abs(float(sums.sum()))
     if not len(size):
         return 1.0

@@ -32,7 +32,7 @@ def wilson(part: int, whole: int) -> Interval:
     return round(100 * ends[0], 4), round(100 * ends[1], 4)
 
 
-def bootstrap_means(values: pd.DataFrame, clusters: pd.Series) -> list[Interval]:
+def bootstrap_means(values: pd.DataFrame, clusters: pd.Series | None) -> list[Interval]:
     """Percentile bootstrap 95 % intervals of the mean of each column, whole clusters drawn with replacement.
 
     All columns share the same draws, which is why this is a matrix product and not `scipy.stats.bootstrap` column by
@@ -40,10 +40,14 @@ def bootstrap_means(values: pd.DataFrame, clusters: pd.Series) -> list[Interval]
 
     Args:
         values: One column per mean; missing values do not count.
-        clusters: Which rows belong together: those of one merging car. Single rows are the plain bootstrap.
+        clusters: Which rows belong together: those of one merging car. None: none do, which is the plain bootstrap.
     """
+    if clusters is None and len(values) > MOST_CLUSTERS:  # as below, but there may be millions of rows
+        columns = (one.to_numpy(dtype=np.float64, na_value=np.nan) for _, one in values.items())
+        known = ((one, ~np.isnan(one)) for one in columns)
+        return [Moments.of(np.where(here, one, 0.0), here.astype(np.int64)).interval() for one, here in known]
     numbers = values.astype(float)
-    by = clusters.to_numpy()
+    by = np.arange(len(values)) if clusters is None else clusters.to_numpy()
     return bootstrap_sums(numbers.groupby(by).sum(), numbers.notna().groupby(by).sum())
 
 
