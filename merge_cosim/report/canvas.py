@@ -67,11 +67,10 @@ def style() -> Any:
     return mpl.rc_context({**STYLE, "font.size": _PAPER.get().font})
 
 
-def panel(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Any]:
+def panel(height: float = HEIGHT) -> tuple[Figure, Any]:
     """Make a figure with one set of axes."""
-    wanted = _PAPER.get().width or width
-    width, height = wanted, height * max(wanted / width, 0.7)
-    figure = Figure(figsize=(width, height), layout="constrained")
+    width = _PAPER.get().width or WIDTH
+    figure = Figure(figsize=(width, height * max(width / WIDTH, 0.7)), layout="constrained")
     return figure, figure.add_subplot()
 
 

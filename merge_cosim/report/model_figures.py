@@ -69,13 +69,9 @@ def transition_figure(model: IntentionModel, lag: int = 1, speeds: Sequence[floa
     return figure
 
 
-def arrival_figure(model: IntentionModel, uniform: float = Pgm().uniform) -> Figure:
-    """P(T_m, T_h | I) for both intentions (as PGM's Fig. 6), and the log-odds that follow.
-
-    Args:
-        model: The model.
-        uniform: Share of the uniform distribution.
-    """
+def arrival_figure(model: IntentionModel) -> Figure:
+    """P(T_m, T_h | I) for both intentions (as PGM's Fig. 6), and the log-odds that follow."""
+    uniform = Pgm().uniform
     end = int(LONGEST_TIME / TIME_BIN)
     both = model.arrivals.probabilities(uniform)[:, :end, :end] / TIME_BIN**2
     odds = model.arrivals.log_odds(uniform)[:end, :end]
@@ -135,15 +131,11 @@ def mixture_figure(model: IntentionModel, lag: int = 1) -> Figure:
     return figure
 
 
-def gaussian_figure(model: IntentionModel, lag: int = 1) -> Figure:
-    """Mean and standard deviation of the change of speed by speed, for both intentions: what PGM-G learned.
-
-    Args:
-        model: The model.
-        lag: Cycles between the two speeds.
-    """
-    gaussian = model.speed(lag).gaussian
-    used = np.flatnonzero(model.speed(lag).histogram.counts.sum(axis=(0, 2))) * SPEED_BIN
+def gaussian_figure(model: IntentionModel) -> Figure:
+    """Mean and standard deviation of the change of speed by speed, for both intentions: what PGM-G learned."""
+    speed = model.speed(1)
+    gaussian = speed.gaussian
+    used = np.flatnonzero(speed.histogram.counts.sum(axis=(0, 2))) * SPEED_BIN
     first, last = int(used[0] // WIDE_BIN), int(used[-1] // WIDE_BIN) + 1
     edges = np.arange(first, last + 1) * WIDE_BIN
     floor = PgmG().min_sigma
@@ -159,7 +151,7 @@ def gaussian_figure(model: IntentionModel, lag: int = 1) -> Figure:
         axes[1].annotate("floor", (edges[0], floor), (2, 2), textcoords="offset points", fontsize=8, color=colors.GREY)
         axes[0].axhline(0.0, color=colors.GREY, lw=0.8)
         axes[0].legend()
-        figure.supxlabel(f"$V_{{t-{lag}}}$ [m/s]", fontsize=9)
+        figure.supxlabel("$V_{t-1}$ [m/s]", fontsize=9)
         figure.supylabel("[m/s]", fontsize=9)
     return figure
 

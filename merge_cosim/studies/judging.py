@@ -53,12 +53,12 @@ class Watched:
         return Watched(self.log_odds[here], self.distance[here], self.margin[here], self.not_yield[here])
 
 
-def open_loop(estimator: Estimator, encounters: Encounters, seed: int = 0) -> Watched:
+def open_loop(estimator: Estimator, encounters: Encounters) -> Watched:
     """Run an estimator on the logs, without driving."""
     log, n = encounters.log, len(encounters)
     assert log is not None
     estimator.start(n, Setting())
-    estimator.reset(np.arange(n), encounters.label, stream_keys(encounters.case, seed))
+    estimator.reset(np.arange(n), encounters.label, stream_keys(encounters.case, 0))
     both = np.minimum(log.merging_station.lengths, log.host_station.lengths)
     parts = []
     for cycle in range(int(both.max()) - 1):

@@ -66,9 +66,9 @@ def replay_logged_host(encounters: Encounters, horizon: float = HORIZON) -> Logg
     return outcome
 
 
-def without_failures(paired: Paired, horizon: float = HORIZON) -> Paired:
+def without_failures(paired: Paired) -> Paired:
     """Move the pairs whose logged host fails from the encounters to the rejected, as `logged_host_fails`."""
-    failed = replay_logged_host(paired.encounters, horizon).failed
+    failed = replay_logged_host(paired.encounters).failed
     if not failed.any():
         return paired
     rejected = {**paired.rejected, "logged_host_fails": tuple(paired.encounters.case[failed])}

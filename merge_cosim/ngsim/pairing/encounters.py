@@ -43,7 +43,6 @@ def site_pairs(
     rules: PairRules | None = None,
     *,
     source: Source | None = None,
-    episodes_from: int | None = None,
 ) -> Paired | None:
     """Return the pairs of `site` in a data folder, and what was rejected; None where the folder has nothing of it.
 
@@ -54,22 +53,19 @@ def site_pairs(
         site: The site.
         rules: The thresholds; those that are not set are the site's. None for the site's.
         source: What the folder holds; None for the site's own recordings. The surrogate's files name it themselves.
-        episodes_from: First episode to use beside the trajectories; None for the site's.
 
     Raises:
         UserError: A file is damaged.
     """
     rules = (rules or PairRules()).over(site.pairs)
     source = source or site.source
-    if episodes_from is None:
-        episodes_from = site.recording.episodes_from
-    choices = (repr(site), source, repr(rules), str(episodes_from), str(COMPLETE_CARS))
+    choices = (repr(site), source, repr(rules), str(COMPLETE_CARS))
     key = "|".join([*_identity(data), *choices, *_versions()])
     cached = cache_folder("encounters") / f"{site.name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.parquet"
     if is_whole(cached):
         return read_pairs(cached)
     began = time.perf_counter()
-    parts = list(_parts(data, site, rules, source, episodes_from))
+    parts = list(_parts(data, site, rules, source))
     if not parts:
         return None
     paired = without_failures(Paired.concatenate(parts))
@@ -84,10 +80,9 @@ def site_encounters(
     rules: PairRules | None = None,
     *,
     source: Source | None = None,
-    episodes_from: int | None = None,
 ) -> Encounters | None:
     """Return only the encounters of `site_pairs`; station 0 is each merging car's own lane change."""
-    paired = site_pairs(data, site, rules, source=source, episodes_from=episodes_from)
+    paired = site_pairs(data, site, rules, source=source)
     return None if paired is None else paired.encounters
 
 
@@ -121,10 +116,11 @@ def at_site_point(encounters: Encounters) -> Encounters:
     return moved.take(np.flatnonzero(moved.merging_station < 0))
 
 
-def _parts(data: Path, site: Site, rules: PairRules, source: Source, episodes_from: int | None) -> Iterator[Paired]:
+def _parts(data: Path, site: Site, rules: PairRules, source: Source) -> Iterator[Paired]:
     table = load_trajectories(data, site)
     if table is not None:
         yield extract_pairs(table, site, rules, source)
+    episodes_from = site.recording.episodes_from
     if episodes_from is not None and not (table is not None and _most_cars(table) > COMPLETE_CARS):
         for path in episode_files(data):
             yield read_episodes(path, site, rules, episodes_from)
