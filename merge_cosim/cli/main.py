@@ -358,10 +358,14 @@ def refusal(error: Exception) -> str | None:
 
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
+    import io
     import os
     import sys
 
     ended_by_signal()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal may lack a character, such as a dash
     if any(not word or EMPTY.fullmatch(word) for word in sys.argv[1:]):
         die("an argument is empty, as where a variable of the shell is not set (see --help)")
     for name in ("LIBSUMO_AS_TRACI", "LIBTRACI_AS_TRACI"):

@@ -5,7 +5,7 @@ import shlex
 from itertools import pairwise
 
 import pytest
-from command import merge_cosim, refused, small_scenario
+from command import merge_cosim, refused, run_process, small_scenario
 
 import merge_cosim as mc
 from merge_cosim.scenarios.methods import is_reference
@@ -30,6 +30,14 @@ def rows_of(printed):
     lines = printed.splitlines()
     rules = [number for number, line in enumerate(lines) if line.strip().startswith("───")]
     return [[line.split() for line in lines[first + 1 : last]] for first, last in pairwise(rules[1:])]
+
+
+def test_a_terminal_that_lacks_a_character_shows_another(tmp_path):
+    words = ("--world", "closed-form", "--method", "acc", "--set", "encounters.count=5")
+    done = run_process("sweep", "designed-random", *words, cwd=tmp_path, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "0.0?43.4" in done.stdout  # a dash between the ends of an interval
+    assert done.stdout.isascii()
 
 
 def test_all_methods_fit_80_columns(swept):
