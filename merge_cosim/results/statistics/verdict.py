@@ -199,19 +199,33 @@ def _sentence(standings: Sequence[_Standing], tied: int, undecided: Sequence[str
     if tied == len(standings):
         share = "" if zero else f" ({standings[0].percent})"
         number = f"each {one.bad:,} of {one.n:,} cases {what}{share}" if same_n and not several else ""
-        return f"No difference between {_listed(names)}: {number or f'{standings[0].percent} {what}'}."
+        same = number or f"{standings[0].percent} {what}"
+        return f"No difference between {_listed(names)}: {same}{_soonest(standings)}."
     lead = f"{_listed(names[:tied])} {'fails' if tied == 1 else 'fail'}{' or' * stuck}"
     lead += (" gets stuck" if tied == 1 else " get stuck") * stuck
     each = " each" * (tied > 1 and same_n)
     text = f"{lead} least: {one.bad:,} of {one.n:,} cases{each}" + ("" if zero else f" ({standings[0].percent})")
     if len(standings[0].counts) > 1:
         text = f"{lead} least: {standings[0].percent} of {one.n:,} cases{each}"
+    text += _soonest(standings[:tied])
     others = standings[tied:]
     named = others[:NAMED] if len(others) > NAMED + 1 else others
     text += "".join(f"; {other.method} {other.number(not same_n)}" for other in named)
     if len(others) > len(named):
         text += f"; {len(others) - len(named)} more up to {others[-1].number(not same_n)} ({others[-1].method})"
     return f"{text}. {_certainty(names, tied, undecided, sample, several)}"
+
+
+def _soonest(tied: Sequence[_Standing]) -> str:
+    """Which of the methods that fail equally often has the least mean delay; empty where there is none to name."""
+    if len(tied) == 1 or tied[0].share == 1.0:
+        return ""
+    if any(len(one.counts) > 1 or one.counts[0].stuck or one.delay == math.inf for one in tied):
+        return ""
+    least, following = (f"{one.delay:.2f} s" for one in tied[:2])
+    return f", {tied[0].method} with the least mean delay ({least}, {tied[1].method} {following})" * (
+        least != following
+    )
 
 
 def _certainty(names: Sequence[str], tied: int, undecided: Sequence[str], sample: bool, several: bool) -> str:
