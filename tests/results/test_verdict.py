@@ -46,6 +46,7 @@ def test_ties_are_named_together_the_faster_first():
         "bad 27 (100.0 %)."
     )
     assert found.best == ("fast", "slow")
+    assert found.headline == found.sentence.partition(";")[0]
 
 
 def test_many_methods_are_counted_after_the_first():

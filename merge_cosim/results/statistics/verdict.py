@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
@@ -40,6 +41,11 @@ class Verdict:
     order: tuple[str, ...] = ()
     best: tuple[str, ...] = ()
     undecided: tuple[str, ...] = ()
+
+    @property
+    def headline(self) -> str:
+        """The sentence up to what follows the best."""
+        return re.split(r"; |\. ", self.sentence)[0].rstrip(".")
 
 
 @dataclass(frozen=True)
