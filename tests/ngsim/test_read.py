@@ -172,6 +172,16 @@ def test_a_missing_column_is_named_with_those_found(tmp_path):
     assert refused(path).startswith(": no column Global_Time;")
 
 
+def test_two_columns_of_one_name_are_refused_where_the_column_is_needed(tmp_path):
+    path = write_csv(tmp_path / "a.csv", ROWS, [*HEADER, "Lane_ID", "Local_Y"])
+    path.write_text(path.read_text().replace(",Lane_ID,Local_Y\n", ",LANE_ID,local_y\n"))
+    assert refused(path).startswith(": two columns are called Local_Y; remove one")
+    path.write_text(path.read_text().replace(",LANE_ID,local_y\n", ",LANE_ID,v_acc\n"))
+    assert refused(path).startswith(": two columns are called Lane_ID; remove one")
+    path.write_text(path.read_text().replace(",LANE_ID,v_acc\n", ",more,v_acc\n"))
+    assert len(us101(path)) == len(ROWS)
+
+
 @pytest.mark.parametrize("write", [write_text, write_csv])
 def test_a_file_cut_short_is_named_with_its_line(tmp_path, write):
     path = write(tmp_path / "a", ROWS)
