@@ -10,7 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from pydantic import BaseModel
 from merge_cosim.api.results import Results
 from merge_cosim.core.encounter import Encounters
 from merge_cosim.estimators.learned.model import IntentionModel
+from merge_cosim.ngsim.formats import TEXT_COLUMNS
 from merge_cosim.ngsim.pairing.tracks import Tracks
 from merge_cosim.ngsim.read import Reading
 from merge_cosim.ramps.ramp import Ramp, Section
@@ -108,13 +109,19 @@ def _number(text: str) -> float:
 
 
 def text_rows(content: bytes, names: tuple[str, ...] | None) -> Iterator[dict[str, str]]:
-    """The rows of a text; `names` of the columns where it has no header, and then blanks separate them, or commas."""
+    """The rows of a text; `names` of the columns where it has no header, and then blanks separate them, or commas.
+
+    A text that has lost its header has NGSIM's columns.
+    """
     lines = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     comma = "," in lines[0]
     parted = csv.reader(lines) if comma else (re.findall(r"[^ \t\v\f]+", line) for line in lines)
     parted = (fields for fields in parted if fields)
-    header = [name.strip().lower() for name in (names or next(parted))]
-    for fields in parted:
+    first = next(parted)
+    if names is None and all(re.fullmatch(r"-?\d+(\.\d*)?", field.strip()) for field in first):
+        names = TEXT_COLUMNS
+    header = [name.strip().lower() for name in names or first]
+    for fields in chain([first] if names else [], parted):
         same("columns of a row", len(fields), len(header))
         cells = dict(zip(header, fields, strict=True))
         yield {name: cells[name.lower()] for name in FIELDS}

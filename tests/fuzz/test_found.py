@@ -232,6 +232,15 @@ def test_a_condition_with_a_part_of_constants(tmp_path: Path) -> None:
     assert merge_cosim("cases", "out", "--where", "0 <= delay_s < 5", cwd=tmp_path).returncode == 0
 
 
+@pytest.mark.parametrize("speed", ["144.44", "0.00"])
+def test_a_road_whose_speed_limit_is_none_that_a_ramp_can_have(tmp_path: Path, speed: str) -> None:
+    net = (shipped("sumo_nets") / "us101" / "us101.net.xml").read_text()
+    (tmp_path / "my.net.xml").write_text(re.sub(' speed="[^"]*"', f' speed="{speed}"', net))
+    for words in (("new", "mine", "--from-net", "my.net.xml"), ("describe", "my.net.xml")):
+        line = refused("ramp", *words, cwd=tmp_path)
+        assert re.search(rf"my\.net\.xml: the speed limit of 'weave' is {float(speed):g} m/s; give another with", line)
+
+
 @pytest.mark.parametrize("offset", ["1e999", "1e999,0.00", "0,1,2", "", "a,b"])
 def test_a_net_whose_offset_is_not_two_numbers(tmp_path: Path, offset: str) -> None:
     net = (shipped("sumo_nets") / "us101" / "us101.net.xml").read_text()

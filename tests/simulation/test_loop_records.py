@@ -183,14 +183,14 @@ def test_nothing_is_left_out_where_a_part_cannot_or_slots_are_taken_again(monkey
 
 @pytest.mark.parametrize("slots", [1, 3])
 def test_what_it_costs_is_the_time_between_the_clocks(slots, monkeypatch):
-    """Clocks that go on by one at each look: two looks a cycle for the method, one before the run and one after it."""
+    """Clocks that go on by 3 s at each look: two looks a cycle for the method, one before the run and one after it."""
     encounters, rules = past_the_point([4, 2, 3])
-    for name, tick in (("perf_counter", 1.0), ("process_time", 0.25)):
+    for name, tick in (("perf_counter", 3.0), ("process_time", 0.25)):
         clock = count(5.0, tick)
         monkeypatch.setattr(loop, name, lambda clock=clock: next(clock))
     cycles = 9 if slots == 1 else 4
     effort = run(encounters, slots, rules=rules).effort
-    assert (effort.wall_s, effort.cpu_s, effort.method_s) == (2 * cycles + 1, 0.25, cycles)
+    assert (effort.wall_s, effort.cpu_s, effort.method_s) == (3 * (2 * cycles + 1), 0.25, 3 * cycles)
     assert (effort.encounter_cycles, effort.vehicle_steps) == (9, 18)
 
 
@@ -345,6 +345,13 @@ def test_encounters_that_the_world_finds(traced):
     np.testing.assert_allclose(found.columns["end_merging_station"], [-11.0 + 12.0, -13.0 + 6.0], atol=1e-6)
     assert (found.effort.encounter_cycles, found.effort.vehicle_steps, found.effort.step_s) == (0, 120, 6.0)
     assert found.encounters.case.tolist() == ["e1", "e3"]
+
+
+def test_one_that_does_not_count_hides_none_that_ends_with_it():
+    world = Passing()
+    world.begins, world.cycles = (0, 0), (4, 4)
+    found = Loop(world, None, HostDriver(AlwaysGo(), Steady()), Same(), Rules(), Setting()).run()
+    assert found.columns["end_cycle"].tolist() == [4]
 
 
 def test_an_encounter_that_the_world_finds_is_over_by_its_settled_stations():

@@ -7,7 +7,7 @@ from pathlib import Path
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.create.folder import definition_text, require_checked
 from merge_cosim.ramps.create.new import RampNumbers, default_merging_point
-from merge_cosim.ramps.create.onramp import Origin, choose, read_source, sources_of, title_of
+from merge_cosim.ramps.create.onramp import Origin, choose, limit_of, read_source, sources_of, title_of
 from merge_cosim.ramps.definition import FILE_NAME, RampFile
 from merge_cosim.ramps.picture import draw
 
@@ -35,7 +35,7 @@ def describe_ramp(net_file: Path, link: str | None = None, speed_limit: float | 
         raise UserError(f"{net_file}: {error}") from None
     length = sum(float(lane.getLength()) for lane in path.beside)
     given = None if speed_limit is None else "merge-cosim ramp describe"
-    limit = speed_limit or float(path.main[path.before].getSpeed())
+    limit = limit_of(path.main[path.before], speed_limit, net_file)
     merging = (*path.ramp, *path.beside)
     definition = RampFile(
         title=title_of(joint, folder.resolve().name),

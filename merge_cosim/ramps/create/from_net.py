@@ -9,7 +9,7 @@ from merge_cosim.ramps.check import STAND_INS
 from merge_cosim.ramps.create.folder import require_new, write_ramp
 from merge_cosim.ramps.create.layout import Layout, lay_out
 from merge_cosim.ramps.create.new import RampNumbers, default_merging_point
-from merge_cosim.ramps.create.onramp import Origin, choose, read_source, sources_of, title_of
+from merge_cosim.ramps.create.onramp import Origin, choose, limit_of, read_source, sources_of, title_of
 from merge_cosim.ramps.create.plain import PlainXml
 from merge_cosim.ramps.definition import Extensions, RampFile
 from merge_cosim.ramps.infer import Course, Joint
@@ -53,7 +53,7 @@ def ramp_from_net(
     if after > downstream:
         raise UserError(f"{origin.file}: the acceleration lane is too long for the road; give --downstream {after:.0f}")
     layout = lay_out(path, upstream, downstream)
-    limit = speed_limit or float(layout.main[layout.gore].lane.getSpeed())
+    limit = limit_of(layout.main[layout.gore].lane, speed_limit, origin.file)
     if speed_limit is None and (stand_in := STAND_INS.get(round(limit, 2))):
         road = layout.main[layout.gore].edge.getID()
         raise UserError(

@@ -11,9 +11,11 @@ import sumolib
 from lxml import etree
 
 from merge_cosim.core.errors import UserError
+from merge_cosim.core.units import MOST_SPEED
 from merge_cosim.core.xml_file import root_element
 from merge_cosim.ramps.create.new import merging_point_source
 from merge_cosim.ramps.infer import MAX_ANGLE, Course, Joint, course, joint_of, joints
+from merge_cosim.ramps.paths import Lane
 from merge_cosim.ramps.ramp import parsed_net
 
 
@@ -60,6 +62,22 @@ def read_source(path: Path, named: Path) -> sumolib.net.Net:
     for edge in net.getEdges():
         edge._name = html.unescape(edge.getName() or "")  # netconvert escapes names of OpenStreetMap twice
     return net
+
+
+def limit_of(lane: Lane, given: float | None, named: Path) -> float:
+    """The speed limit that is given, else that of a lane of the main road [m/s]; `named` is the file of error lines.
+
+    Raises:
+        UserError: The lane's is none that a ramp can have.
+    """
+    if given is not None:
+        return given
+    limit = float(lane.getSpeed())
+    if not 0.01 <= limit <= MOST_SPEED:
+        raise UserError(
+            f"{named}: the speed limit of '{lane.getEdge().getID()}' is {limit:g} m/s; give another with --speed-limit"
+        )
+    return limit
 
 
 def choose(net: sumolib.net.Net, link: str | None, upstream: float, downstream: float) -> tuple[Joint, Course]:
