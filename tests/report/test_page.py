@@ -25,7 +25,7 @@ def page(swept):
 
 def test_the_verdict_stands_first_and_is_that_of_the_statistics(swept, page):
     document = html.fromstring(page)
-    section = document.xpath("//main/section")[0]
+    section = document.xpath("//main/section[@class='test']")[0]
     assert [child.tag for child in section][:2] == ["h2", "p"]
     rows = ResultFolder(swept).results().to_pandas()
     summary = pd.DataFrame(json.loads((swept / "summary.json").read_text()))
