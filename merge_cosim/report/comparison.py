@@ -169,7 +169,8 @@ def _kept(part: pd.DataFrame) -> pd.DataFrame:
     """What the comparison of a group rests on, of some of its rows."""
     names = [f"{name}_{side}" for name in ("failed", "censored", *MEASURES) for side in "ab"]
     named = bool((part["car_a"] != "").any())
-    return part[names].assign(cluster=clusters_of(part.rename(columns={"car_a": "car"})) if named else None)
+    own = part[names].copy()  # not a view that keeps the other columns in memory
+    return own.assign(cluster=clusters_of(part.rename(columns={"car_a": "car"})) if named else None)
 
 
 def _row(parts: list[pd.DataFrame], sample: bool) -> dict[str, Any]:
@@ -182,24 +183,21 @@ def _row(parts: list[pd.DataFrame], sample: bool) -> dict[str, Any]:
     failed = [column(f"failed_{side}") for side in "ab"]
     scored = [one[carried].to_numpy(dtype=bool) for one in failed]
     only_a, only_b = (int((one & ~other).sum()) for one, other in (scored, scored[::-1]))
-    means: dict[str, Any] = {}
-    differences: dict[str, pd.Series] = {}
-    for name in ("failure_pct", *MEASURES):
-        if name == "failure_pct":
-            sides = [100.0 * one.where(carried) for one in failed]
-        else:
-            sides = [column(f"{name}_{side}") for side in "ab"]
-        means |= {f"{name}_{side}": one.mean() for side, one in zip("ab", sides, strict=True)}
-        differences[name] = sides[0].astype(float) - sides[1].astype(float)
-    means |= {f"{name}_difference": one.mean() for name, one in differences.items()}
     names = column("cluster")
     named = names.notna()
     clusters = names.where(named, names.index.map(str)) if named.any() else None
-    intervals = bootstrap_means(pd.DataFrame(differences), clusters) if sample else [(None, None)] * len(differences)
-    means |= {
-        f"{name}_interval": None if low is None or high is None else f"{low:.2f} – {high:.2f}".replace("-", "−")
-        for name, (low, high) in zip(differences, intervals, strict=True)
-    }
+    means: dict[str, Any] = {}
+    for name in ("failure_pct", *MEASURES):
+        if name == "failure_pct":
+            sides = [100.0 * one.astype(float).where(carried) for one in failed]
+        else:
+            sides = [column(f"{name}_{side}") for side in "ab"]
+        means |= {f"{name}_{side}": one.mean() for side, one in zip("ab", sides, strict=True)}
+        difference = sides[0].astype(float) - sides[1].astype(float)
+        means[f"{name}_difference"] = difference.mean()
+        low, high = bootstrap_means(difference.to_frame(), clusters)[0] if sample else (None, None)
+        within = None if low is None or high is None else f"{low:.2f} – {high:.2f}".replace("-", "−")
+        means[f"{name}_interval"] = within
     if not only_a + only_b:  # every resample is the same, which is no certainty
         means["failure_pct_interval"] = None
     signs = scored[0].astype(int) - scored[1].astype(int)
