@@ -36,11 +36,12 @@ from merge_cosim.scenarios.methods import ORACLE_BEST
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.adding import joined, missing
 from merge_cosim.sweeps.chunks import Chunk, ChunkQueue, cut
-from merge_cosim.sweeps.executors import Executor, InProcess, Processes, executor_for
+from merge_cosim.sweeps.executors import Executor, executor_for
 from merge_cosim.sweeps.forecast import LONG_S, forecast, seconds
 from merge_cosim.sweeps.identity import identity
 from merge_cosim.sweeps.plan import SweepRequest, plan, refuse_unsound_ramps
 from merge_cosim.sweeps.single_timing import time_single_cases
+from merge_cosim.sweeps.task import Task
 from merge_cosim.sweeps.traces import record
 from merge_cosim.sweeps.traffic_cases import refuse_empty
 
@@ -136,7 +137,6 @@ def sweep(
         with closing(executor_for(request, len(queue))) as executor:
             tally = _run(executor, queue, chunks, folder, progress)
             ran = perf_counter()
-            single_us = time_single_cases(tasks, executor if isinstance(executor, Processes) else InProcess())
             folder.merge(oracle_best if ORACLE_BEST in what["methods"] else None)
             folder.traces.begin(keep=add)
             record(request, every, folder, earlier.recorded, executor, progress)
@@ -144,7 +144,7 @@ def sweep(
         folder.parts.finish_if_empty()  # nothing was run: there is nothing to resume
         raise
     scenes = folder.parts.scenes()
-    _sum_up(folder, scenes, tally, single_us, reference_of(what["methods"], what["against"]), earlier)
+    _sum_up(tasks, folder, scenes, tally, reference_of(what["methods"], what["against"]), earlier)
     effort, run_s = tally.effort, ran - planned
     manifest = {
         **what,
@@ -209,14 +209,15 @@ def _run(
 
 
 def _sum_up(
+    tasks: Sequence[Task],
     folder: ResultFolder,
     scenes: list[dict[str, Any]],
     tally: _Tally,
-    single_us: dict[str, float],
     against: str | None,
     earlier: _Earlier,
 ) -> None:
     """Write the summary and the tables beside it, one scenario and variation at a time."""
+    single_us = time_single_cases(tasks)
     cycle_us = earlier.cycle_us | {
         name: (1e6 * effort.method_s / effort.encounter_cycles, single_us.get(name))
         for name, effort in tally.by_method.items()

@@ -3,7 +3,6 @@
 import pytest
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.sweeps.executors import InProcess
 from merge_cosim.sweeps.plan import SweepRequest, plan
 from merge_cosim.sweeps.single import case_alone, trace_case, trace_methods
 from merge_cosim.sweeps.single_timing import SINGLE_CASES, time_single_cases
@@ -32,8 +31,7 @@ def test_a_trace_goes_up_to_the_last_command():
 
 def test_a_few_cases_are_timed():
     settings = {"encounters.count": 8}
-    tasks = plan(SweepRequest(["designed-random"], ["acc", "always-go"], settings=settings, world="closed-form"))
-    times = time_single_cases(tasks, InProcess())
+    times = time_single_cases(plan(SweepRequest(["designed-random"], ["acc", "always-go"], settings=settings)))
     assert set(times) == {"acc", "always-go"}
     assert all(time > 0 for time in times.values())
     assert SINGLE_CASES < 8
