@@ -19,7 +19,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "gym.md"
 def test_every_snippet_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = PAGE.read_text(encoding="utf-8")
-    long = "GENERATIONS, CANDIDATES, CASES, HIDDEN, SEED = 40, 64, 64, 8, 0"
+    long = "GENERATIONS, CANDIDATES, CASES, HIDDEN, SEED = 60, 64, 192, 8, 0"
     assert long in text
     text = text.replace(long, "GENERATIONS, CANDIDATES, CASES, HIDDEN, SEED = 2, 8, 4, 8, 0")
     text = text.replace('mc.sweep("designed-3"', 'mc.sweep("designed-3", settings={"encounters.count": 40}')
