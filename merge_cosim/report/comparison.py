@@ -183,9 +183,7 @@ def _row(parts: list[pd.DataFrame], sample: bool) -> dict[str, Any]:
     failed = [column(f"failed_{side}") for side in "ab"]
     scored = [one[carried].to_numpy(dtype=bool) for one in failed]
     only_a, only_b = (int((one & ~other).sum()) for one, other in (scored, scored[::-1]))
-    names = column("cluster")
-    named = names.notna()
-    clusters = names.where(named, names.index.map(str)) if named.any() else None
+    clusters = _clusters(column("cluster"))
     means: dict[str, Any] = {}
     for name in ("failure_pct", *MEASURES):
         if name == "failure_pct":
@@ -203,6 +201,12 @@ def _row(parts: list[pd.DataFrame], sample: bool) -> dict[str, Any]:
     signs = scored[0].astype(int) - scored[1].astype(int)
     p = sign_flip_p(signs, None if clusters is None else clusters[carried].to_numpy()) if sample else None
     return {"n": len(signs), "only_a": only_a, "only_b": only_b, "p": p, **means}
+
+
+def _clusters(names: pd.Series) -> pd.Series | None:
+    """The cluster of each row, which stands alone where it has no name; None where none has one."""
+    named = names.notna()
+    return names.where(named, names.index.map(str)) if named.any() else None
 
 
 def _differences(folders: list[ResultFolder], held: list[pd.DataFrame], every: bool) -> list[str]:
