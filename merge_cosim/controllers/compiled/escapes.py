@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from merge_cosim.core.kernels import kernel
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.estimators.compiled.drivers import TOL
 
@@ -34,7 +34,7 @@ class Bounds(NamedTuple):
     cycles: int
 
 
-@njit(cache=True)
+@kernel
 def waits_beside(host_station: float, host_length: float, station: float, speed: float, past: float) -> bool:
     """Whether a driver stands at the merging point with the host level with it or ahead, not yet past by `past`.
 
@@ -44,7 +44,7 @@ def waits_beside(host_station: float, host_length: float, station: float, speed:
     return stands and -TOL <= host_station - station < host_length + past
 
 
-@njit(cache=True)
+@kernel
 def escapes(
     first: float,
     then: float,
@@ -117,14 +117,14 @@ def escapes(
     return False
 
 
-@njit(cache=True)
+@kernel
 def narrowed(share: float, centre: float, bounds: Bounds) -> tuple[float, float]:
     """A share of the range of a driver's accelerations [m/s^2], around what it is expected to do."""
     low = centre - share * (centre + bounds.driver_braking)
     return low, centre + share * (bounds.driver_acceleration - centre)
 
 
-@njit(cache=True)
+@kernel
 def kept(
     first: float,
     state: FloatArray,
@@ -143,7 +143,7 @@ def kept(
     return False
 
 
-@njit(cache=True)
+@kernel
 def constrain(
     state: FloatArray,
     guarded: BoolArray,
@@ -197,7 +197,7 @@ def constrain(
                 break
 
 
-@njit(cache=True)
+@kernel
 def widest(
     state: FloatArray, shares: FloatArray, centre: FloatArray, since: FloatArray, bounds: Bounds, found: FloatArray
 ) -> None:

@@ -1,14 +1,14 @@
 """iPCB's predictions: how near each candidate acceleration brings the two cars, and how much speed it costs."""
 
 import numpy as np
-from numba import njit
 
+from merge_cosim.core.kernels import kernel
 from merge_cosim.core.units import TOLERANCE, FloatArray
 
 TOL = TOLERANCE
 
 
-@njit(cache=True)
+@kernel
 def predict(
     state: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
     gains: FloatArray,
@@ -58,7 +58,7 @@ def predict(
     return gap, slow
 
 
-@njit(cache=True)
+@kernel
 def _merging_stations(start: float, speed: float, gain: float, step: float, limit: float, stations: FloatArray) -> None:
     """Stations [m] of a merging car that changes its speed in the steps that begin before the merging point."""
     steps, before = len(stations), 0

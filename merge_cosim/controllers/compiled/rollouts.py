@@ -4,8 +4,8 @@ from math import exp, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from merge_cosim.core.kernels import kernel
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
 from merge_cosim.estimators.compiled.drivers import TOL, DriverLaw, arrival, needed, reacting
 
@@ -40,7 +40,7 @@ class HostLaw(NamedTuple):
     reacts: bool
 
 
-@njit(cache=True)
+@kernel
 def host_acceleration(
     policy: int,
     held: float,
@@ -76,7 +76,7 @@ def host_acceleration(
     return min(max(wanted, host.min_acceleration), host.max_acceleration)
 
 
-@njit(cache=True)
+@kernel
 def least_time(way: float, speed: float, limit: float, host: HostLaw) -> float:
     """A time [s] that is surely not above what a rollout takes for the rest of the way to the goal."""
     if way > 4.0 * limit / host.k_free:  # there the speed after the rollout may be taken to be above the limit
@@ -84,7 +84,7 @@ def least_time(way: float, speed: float, limit: float, host: HostLaw) -> float:
     return way / (1.1 * max(limit, speed))
 
 
-@njit(cache=True)
+@kernel
 def rollout(
     policy: int,
     held: float,
@@ -169,7 +169,7 @@ def rollout(
     return cost + host.overlap * probability, probability
 
 
-@njit(cache=True)
+@kernel
 def expected_cost(
     row: int,
     policy: int,
@@ -210,7 +210,7 @@ def expected_cost(
     return expected, danger
 
 
-@njit(cache=True)
+@kernel
 def cost_table(
     state: FloatArray,
     belief: FloatArray,
@@ -250,7 +250,7 @@ def cost_table(
                     )
 
 
-@njit(cache=True)
+@kernel
 def choose(
     state: FloatArray,
     plans: BoolArray,

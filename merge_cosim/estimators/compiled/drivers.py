@@ -5,7 +5,7 @@ Everything is scalar and compiled without reordering of sums, so that a result d
 
 from typing import NamedTuple
 
-from numba import njit
+from merge_cosim.core.kernels import kernel
 
 TOL = 1e-6
 NEAR = 0.1
@@ -29,13 +29,13 @@ class DriverLaw(NamedTuple):
     dt: float
 
 
-@njit(cache=True)
+@kernel
 def arrival(station: float, speed: float) -> float:
     """Time [s] to reach station 0 at the present speed, as `time_to_arrival`."""
     return max(-station, 0.0) / max(speed, 0.5)
 
 
-@njit(cache=True)
+@kernel
 def needed(way: float, speed: float, time: float) -> float:
     """Constant acceleration [m/s^2] that covers `way` in `time`; where that would stop short, the stop at the point."""
     if speed * time > 2.0 * way:
@@ -43,7 +43,7 @@ def needed(way: float, speed: float, time: float) -> float:
     return 2.0 * (way - speed * time) / (time * time)
 
 
-@njit(cache=True)
+@kernel
 def planned(kind: int, trait: float, host_arrival: float, station: float, speed: float, law: DriverLaw) -> float:
     """Acceleration [m/s^2] that a driver of a type plans before either car has reached the merging point.
 
@@ -69,7 +69,7 @@ def planned(kind: int, trait: float, host_arrival: float, station: float, speed:
     return min(max(wanted, law.min_acceleration), law.max_acceleration)
 
 
-@njit(cache=True)
+@kernel
 def reacting(
     kind: int,
     trait: float,

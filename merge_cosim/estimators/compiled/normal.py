@@ -3,8 +3,8 @@
 from math import log, sqrt
 
 import numpy as np
-from numba import njit
 
+from merge_cosim.core.kernels import kernel
 from merge_cosim.core.units import FloatArray
 
 _GOLDEN, _FIRST, _SECOND = (np.uint64(c) for c in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB))
@@ -16,7 +16,7 @@ _INNER = 1.1
 _ROOT_TAU = 2.50662827463100050242
 
 
-@njit(cache=True)
+@kernel
 def uniform(key: np.uint64, place: np.uint64) -> float:
     """Number `place` (from 0) of a stream, uniform on (0, 1)."""
     bits = key + (place + np.uint64(1)) * _GOLDEN
@@ -26,13 +26,13 @@ def uniform(key: np.uint64, place: np.uint64) -> float:
     return (float(bits >> _UNIT_BITS) + 0.5) * 2.0**-53
 
 
-@njit(cache=True)
+@kernel
 def normal(key: np.uint64, place: np.uint64) -> float:
     """Number `place` (from 0) of a stream as a standard normal one."""
     return quantile(uniform(key, place))
 
 
-@njit(cache=True)
+@kernel
 def normals(key: np.uint64, place: np.uint64, filled: FloatArray) -> None:
     """Fill an array with the numbers from `place` on of a stream as standard normal ones, with few branches."""
     outer, count = np.empty(len(filled), dtype=np.int64), 0
@@ -45,7 +45,7 @@ def normals(key: np.uint64, place: np.uint64, filled: FloatArray) -> None:
         filled[i] = quantile(uniform(key, place + np.uint64(i)))
 
 
-@njit(cache=True)
+@kernel
 def quantile(share: float) -> float:
     """Quantile of the standard normal distribution (Moshier, Cephes Mathematical Library, `ndtri`, as in SciPy)."""
     upper = share > 1.0 - _TAIL
@@ -53,7 +53,7 @@ def quantile(share: float) -> float:
     return _middle(y) if y > _TAIL else _outer(y) if upper else -_outer(y)
 
 
-@njit(cache=True)
+@kernel
 def _middle(y: float) -> float:
     """The quantile of shares that are not near to 0 or 1."""
     y -= 0.5
@@ -66,7 +66,7 @@ def _middle(y: float) -> float:
     return (y + y * (z * p / q)) * _ROOT_TAU
 
 
-@njit(cache=True)
+@kernel
 def _outer(y: float) -> float:
     """How far below 0 the quantile of a share near to 0 is."""
     x = sqrt(-2.0 * log(y))

@@ -7,8 +7,8 @@ from math import exp, inf
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from merge_cosim.core.kernels import kernel
 from merge_cosim.core.random_streams import Keys
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.compiled.normal import normals, uniform
@@ -61,7 +61,7 @@ class FilterLaw(NamedTuple):
     new: int
 
 
-@njit(cache=True)
+@kernel
 def mean_acceleration(
     maneuver: IntArray,
     station: FloatArray,
@@ -84,7 +84,7 @@ def mean_acceleration(
         mean[i] = min(max(wanted, law.min_acceleration), law.max_acceleration)
 
 
-@njit(cache=True)
+@kernel
 def mean_accelerations(
     maneuver: IntArray,
     station: FloatArray,
@@ -103,7 +103,7 @@ def mean_accelerations(
     return mean
 
 
-@njit(cache=True)
+@kernel
 def step(
     cloud: Particles,
     rows: IntArray,
@@ -177,7 +177,7 @@ def step(
         drawn[n] = place + np.uint64(1)
 
 
-@njit(cache=True)
+@kernel
 def change(maneuver: IntArray, key: np.uint64, place: np.uint64, chance: float) -> None:
     """Let each maneuver change with a probability, to either other one alike; numbers of a stream from `place` on."""
     for i in range(len(maneuver)):
@@ -187,7 +187,7 @@ def change(maneuver: IntArray, key: np.uint64, place: np.uint64, chance: float) 
             maneuver[i] = (maneuver[i] + (2 if drawn < 1.0 else 1)) % MANEUVERS
 
 
-@njit(cache=True)
+@kernel
 def weigh(
     station: FloatArray, speed: FloatArray, seen_station: float, seen_speed: float, law: FilterLaw, weights: FloatArray
 ) -> None:
@@ -206,7 +206,7 @@ def weigh(
         weights[i] /= total
 
 
-@njit(cache=True)
+@kernel
 def choose(weights: FloatArray, start: float, count: int, chosen: IntArray) -> None:
     """Low-variance resampling of one row, see `merge_cosim.estimators.particles.low_variance`."""
     total = 0.0

@@ -4,8 +4,8 @@ from math import exp, log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from merge_cosim.core.kernels import kernel
 from merge_cosim.core.units import FloatArray, IntArray
 from merge_cosim.estimators.compiled.drivers import ACCELERATE, IGNORE, LATE, NOT_YIELD, DriverLaw, arrival, reacting
 
@@ -22,7 +22,7 @@ class FilterLaw(NamedTuple):
     changes: float
 
 
-@njit(cache=True)
+@kernel
 def update(
     host_station: FloatArray,
     host_speed: FloatArray,
