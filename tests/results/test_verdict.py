@@ -34,7 +34,7 @@ def test_a_grid_has_counts_without_a_test_and_references_do_not_compete():
     )
     assert found.sentence == (
         "ipcb fails or gets stuck least: 0 of 6,875 cases; acc 196 (2.9 %); pgm 361 (5.3 %). "
-        "The cases are a fixed grid, so these are counts without chance."
+        "The cases are a fixed grid: the counts are exact for it, not a sample."
     )
     assert (found.order, found.best, found.undecided) == (("ipcb", "acc", "pgm"), ("ipcb",), ())
 
@@ -42,7 +42,7 @@ def test_a_grid_has_counts_without_a_test_and_references_do_not_compete():
 def test_ties_are_named_together_the_faster_first():
     found = verdict(_summary(slow=(27, 1, 0, 2.0), fast=(27, 1, 0, 1.0), bad=(27, 27, 0, 0.0)))
     assert found.sentence.startswith(
-        "fast and slow fail least: 1 of 27 cases each (3.7 %), fast with the least mean delay (1.00 s, slow 2.00 s); "
+        "fast and slow fail least: 1 of 27 cases each (3.7 %), fast with the least mean delay of these (1.00 s, then slow 2.00 s); "
         "bad 27 (100.0 %)."
     )
     assert found.best == ("fast", "slow")
@@ -80,7 +80,7 @@ def test_a_single_one_is_not_counted_but_named():
         (
             {"acc": (9, 0, 0, 1.0), "pgm": (9, 0, 0, 0.5)},
             "No difference between pgm and acc: each 0 of 9 cases failed, "
-            "pgm with the least mean delay (0.50 s, acc 1.00 s).",
+            "pgm with the least mean delay of these (0.50 s, then acc 1.00 s).",
         ),
         (
             {"acc": (9, 9, 0, 1.0), "pgm": (8, 8, 0, 0.5)},

@@ -229,14 +229,14 @@ def _soonest(tied: Sequence[_Standing]) -> str:
     if any(len(one.counts) > 1 or one.counts[0].stuck or one.delay == math.inf for one in tied):
         return ""
     least, following = (f"{one.delay:.2f} s" for one in tied[:2])
-    return f", {tied[0].method} with the least mean delay ({least}, {tied[1].method} {following})" * (
+    return f", {tied[0].method} with the least mean delay of these ({least}, then {tied[1].method} {following})" * (
         least != following
     )
 
 
 def _certainty(names: Sequence[str], tied: int, undecided: Sequence[str], sample: bool, several: bool) -> str:
     if not sample and not several:
-        return "The cases are a fixed grid, so these are counts without chance."
+        return "The cases are a fixed grid: the counts are exact for it, not a sample."
     open_ = [name for name in names[tied:] if name in undecided]
     who = names[0] if tied == 1 or open_ else _listed(names[:tied])
     if not sample:
