@@ -229,9 +229,9 @@ def _soonest(tied: Sequence[_Standing]) -> str:
     if any(len(one.counts) > 1 or one.counts[0].stuck or one.delay == math.inf for one in tied):
         return ""
     least, following = (f"{one.delay:.2f} s" for one in tied[:2])
-    return f", {tied[0].method} with the least mean delay of these ({least}, then {tied[1].method} {following})" * (
-        least != following
-    )
+    if least == following:
+        return ""
+    return f", {tied[0].method} with the least mean delay of these ({least}, then {tied[1].method} {following})"
 
 
 def _certainty(names: Sequence[str], tied: int, undecided: Sequence[str], sample: bool, several: bool) -> str:
