@@ -42,7 +42,8 @@ def test_a_grid_has_counts_without_a_test_and_references_do_not_compete():
 def test_ties_are_named_together_the_faster_first():
     found = verdict(_summary(slow=(27, 1, 0, 2.0), fast=(27, 1, 0, 1.0), bad=(27, 27, 0, 0.0)))
     assert found.sentence.startswith(
-        "fast and slow fail least: 1 of 27 cases each (3.7 %), fast with the least mean delay of these (1.00 s, then slow 2.00 s); "
+        "fast and slow fail least: 1 of 27 cases each (3.7 %), fast with the least mean delay of these "
+        "(1.00 s, then slow 2.00 s); "
         "bad 27 (100.0 %)."
     )
     assert found.best == ("fast", "slow")
