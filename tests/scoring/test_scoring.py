@@ -262,3 +262,12 @@ def test_a_contact_with_the_leader_counts_where_the_two_had_none():
         columns = score(replace(tracks, around=around), DEFAULTS)
         assert columns["kind"].tolist() == [kind]
         assert columns["min_leader_gap_m"].tolist() == [min(gaps)]
+
+
+def test_a_watch_grows_to_the_slots_there_are():
+    watch = Watch(3, DEFAULTS)
+    watch.make_room(5)
+    states = laid([-9.0] * 5, [-9.0] * 5).states
+    assert watch.over(np.full(5, 10), states).tolist() == [False] * 5
+    watch.reset(np.array([4]), np.array([10]))
+    assert watch.over(np.full(5, 10), states).tolist() == [False] * 4 + [True]

@@ -420,3 +420,32 @@ def test_the_seed_is_the_worlds():
     assert world.seed == 0
     Loop(world, None, driver, Same(), Rules(), Setting(), seed=5)
     assert world.seed == 5
+
+
+class Misread(Same):
+    """Is seen 1 m/s slower than it drives."""
+
+    name = "misread"
+
+    def observed_speed(self, age, speed):
+        return speed - 1.0
+
+
+class Seeing(AlwaysGo):
+    """Keeps the merging cars' speeds that it sees."""
+
+    name = "seeing"
+
+    def update(self, seen):
+        self.speeds = seen.merging_speed.tolist()
+        return super().update(seen)
+
+
+@pytest.mark.parametrize(("car", "seen"), [(Misread, 28.0), (Same, 29.0)])
+def test_the_host_sees_the_speed_that_is_observed(car, seen):
+    encounters, rules = past_the_point([2, 2])
+    driver = HostDriver(Seeing(), Acc())
+    running = Loop(ClosedFormWorld(2), encounters, driver, car(), rules, Setting())
+    found = running.run()
+    assert running._driver._blocks[0].estimator.speeds == [seen, seen]
+    assert found.columns["end_merging_speed"].tolist() == [29.0, 29.0]
