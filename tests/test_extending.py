@@ -58,6 +58,13 @@ def test_a_controller_from_a_file(files):
     assert methods(files) == {"acc+gentle"}
 
 
+def test_a_merging_car_from_a_file(files):
+    words = ("sweep", "shifted-idm", "--plugin", "my_merging_car.py", "--method", "acc", "--out", "out", "--overwrite")
+    words += ("--json", "--set", "encounters.count=20", "--set", "merging.model=hurrying", "--set")
+    slow, fast = (printed(merge_cosim(*words, f"merging.gain={gain}", cwd=files)) for gain in (0, 2))
+    assert json.loads(slow)["summary"][0]["delay_s"] != json.loads(fast)["summary"][0]["delay_s"]
+
+
 def test_a_sensor_from_a_file(files):
     words = ("--plugin", "my_sensor.py", "--method", "acc", "--set", "sensing.model=near")
     far, near = (
