@@ -179,8 +179,8 @@ gore, auxiliary lane (US-101) and acceleration lane (I-80). In the median logged
 centre of their lane in the net ([US-101](#us-101), [I-80](#i-80)); where it is worse, and why, is under
 [weaknesses](#weaknesses). The plain XML in `sumo_nets/` is written by
 
-    python tools/ramp_geometry.py --data DIR       # DIR/geometry/ and NGSIM's trajectories; writes and builds both
-    python tools/geometry_page.py --data DIR       # this page
+    python tools/ramp_geometry.py --data DIR  # DIR/geometry/ and NGSIM's trajectories; writes and builds both
+    python tools/geometry_page.py --data DIR  # this page
 
 To build a net again (`merge-cosim ramp build us101`) no survey file is needed. `merge-cosim ramp edit us101` opens it
 in netedit; `view.xml` in each folder colours the lanes by their role.

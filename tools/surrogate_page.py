@@ -181,7 +181,7 @@ human drivers. In short: speeds, distances and the share of yielding are near th
 too smooth, merging happens too early, and the order of the two cars is less clear from afar
 ([where it falls short](#where-it-falls-short)).
 
-    merge-cosim ngsim surrogate --out DIR          # the files themselves; both sites take about a minute, once
+    merge-cosim ngsim surrogate --out DIR  # the files themselves; both sites take about a minute, once
 
 {minutes:.0f} minutes of traffic per site, in {recordings} recordings with a seed each: with one version of SUMO the
 same bytes every time. All drivers use SUMO's car-following model EIDM with its lane-change model LC2013; the on-ramp's
