@@ -1,1 +1,1 @@
-"""What a Python user calls: `import merge_cosim as mc` shows these names. The command line is made of them, too."""
+"""What a Python user calls; `import merge_cosim as mc` offers these names, and the command line calls them too."""

@@ -185,8 +185,8 @@ COLUMNS = (
         "min_leader_gap_m",
         NUMBER,
         "m",
-        "in scenes: smallest bumper gap to the car ahead in the host's lane, whichever it is, from the meeting's "
-        "begin to its end ([traffic](traffic.md))",
+        "in scenes: smallest bumper gap to the car ahead in the host's lane, whichever it is, from the "
+        "beginning of the meeting to its end ([traffic](traffic.md))",
         f"{NO_SCENE}; no such car within 150 m",
     ),
     Column(
