@@ -65,7 +65,7 @@ class Results:
 
     @cached_property
     def rows(self) -> pd.DataFrame:
-        """One row per scenario, variation, case and method; the columns are explained in docs/results.md."""
+        """One row per scenario, variation, case and method; the columns are explained in docs/measures.md."""
         return self._store.results().to_pandas()
 
     @cached_property
