@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from merge_cosim.core import colors
+from merge_cosim.core.units import FloatArray
 from merge_cosim.report import canvas
 from merge_cosim.report.methods import Look
 
@@ -112,14 +113,21 @@ def _label(figure: Figure, axes: Any, places: Sequence[tuple[float, float, str, 
                 moved = Bbox.from_bounds(left, anchor[1] - box.height / 2, box.width, box.height)
                 outside = moved.x0 < axes.bbox.x0 or moved.x1 > right or moved.y0 < low or moved.y1 > high + 6 * point
                 covered = sum(_common(moved, other) for other in taken)
-                found.append((reach + 3 * covered / point**2 + 1000 * outside, reach, moved))
-        _, reach, moved = min(found, key=lambda one: one[0])
+                away = _distances(points, moved)
+                nearer = bool((away < _distances(at[None], moved) - point).any())  # it would seem another's name
+                found.append((reach + 3 * covered / point**2 + 8 * nearer + 1000 * outside, reach, nearer, moved))
+        _, reach, nearer, moved = min(found, key=lambda one: one[0])
         taken.append(moved)
         text.set_position(axes.transData.inverted().transform((moved.x0, moved.y0 + moved.height / 2)))
-        if reach > REACHES[2]:
+        if nearer or reach > REACHES[2]:
             end = np.clip(at, [moved.x0, moved.y0], [moved.x1, moved.y1])
             (x0, y0), (x1, y1) = axes.transData.inverted().transform([at, end])
             axes.plot([x0, x1], [y0, y1], color=colors.GREY, lw=0.5, zorder=3, clip_on=False)
+
+
+def _distances(points: FloatArray, box: Bbox) -> FloatArray:
+    """Distance of each point, shape (n, 2), from a box."""
+    return np.linalg.norm(points - np.clip(points, box.min, box.max), axis=1)
 
 
 def _common(one: Bbox, other: Bbox) -> float:
