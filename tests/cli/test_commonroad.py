@@ -170,7 +170,7 @@ def test_the_place_on_earth_is_the_nets(exported):
 
 @pytest.mark.parametrize("exported", ["us101"], indirect=True)  # the example reads the file of US-101
 def test_the_pages_example_runs(exported):
-    page = (Path(__file__).parents[2] / "docs/sumo-tools.md").read_text()
+    page = (Path(__file__).parents[2] / "docs/sumo-tools.md").read_text().replace(" \\\n    ", " ")
     assert f"merge-cosim export {' '.join(CASES['us101'])} --out cr --commonroad" in page
     assert " ".join(CASES["designed"]) in page
     (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)

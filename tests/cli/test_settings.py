@@ -38,7 +38,7 @@ import merge_cosim as package
         ),
         (("--set", "sensing.model=radar", "--set", "sensing.dely=1"), "no parameter 'dely'; did you mean 'delay'?"),
         (("--method", "acc,pgn"), "unknown estimator 'pgn'; did you mean 'pgm'?"),
-        (("--method", ""), "unknown estimator ''"),
+        (("--method", ""), "an argument is empty"),
     ],
 )
 def test_what_reaches_nothing_or_makes_no_sense_is_refused(tmp_path, words, line):

@@ -152,4 +152,4 @@ def test_the_commands_of_the_page(tmp_path: Path, mona_dir: Path) -> None:
     assert facts["rejected"] == {"no_host": 1, "logged_host_fails": 1}
     for method, row in summary(tmp_path / "out").items():
         assert f"| {method} | {row['failures']} of {row['n']} |" in text
-        assert f"| {row['distance_m']:.1f} m | {row['delay_s']:.2f} s | {row['hardest_braking']:.2f} m/s2 |" in text
+        assert f"| {row['distance_m']:.1f} m | {row['delay_s']:.2f} s | {row['hardest_braking']:.2f} m/s² |" in text
