@@ -45,7 +45,8 @@ def _root(chosen: str) -> Path:
     if chosen:
         return Path(chosen)
     usual = (PACKAGE / "__pycache__", Path(user_cache_dir("merge-cosim-kernels")))
-    return next(filter(_writable, usual), Path(tempfile.gettempdir()))
+    found = next(filter(_writable, usual), None)
+    return found or Path(tempfile.mkdtemp(prefix="merge-cosim-"))  # its own, for what is kept there is run
 
 
 def _writable(folder: Path) -> bool:
