@@ -3,6 +3,7 @@
 import numpy as np
 
 from merge_cosim.core.encounter import Encounters
+from merge_cosim.merging_cars.designed import Designed
 
 
 def random_encounters(count: int, seed: int, merge_position: float = 0.0) -> Encounters:
@@ -30,3 +31,12 @@ def random_encounters(count: int, seed: int, merge_position: float = 0.0) -> Enc
         smoothed_source=np.zeros(count, dtype=bool),
         length_missing=np.zeros(count, dtype=bool),
     )
+
+
+class Same(Designed):
+    """Keeps the merging car's speed."""
+
+    name = "same"
+
+    def next_speed(self, age, now):
+        return now.merging_speed
