@@ -79,7 +79,7 @@ class Configuration:
             if not each.is_file():
                 raise UserError(f"{file}: {each}: no such file")
         _require_ramp(file, nets[0])
-        step = _seconds(options.get("step-length", repr(DT)), file)
+        step = _seconds(options.get("step-length", "1"), file)  # SUMO's own default
         end = _seconds(options.get("end", "-1"), file)
         return cls(
             *(file, nets[0], routes, additional, _seconds(options.get("begin", "0"), file)),
@@ -89,7 +89,9 @@ class Configuration:
     def note_step(self) -> None:
         """Say, on standard error, that another step than `DT` is not taken."""
         if abs(self.step - DT) > TOLERANCE:
-            print(f"{self.file}: step-length {self.step:g} s is not used: a cycle is {DT:g} s", file=sys.stderr)
+            default = " (SUMO's default)" if self.step == 1.0 else ""
+            line = f"{self.file}: step-length {self.step:g} s{default} is not used: a cycle is {DT:g} s"
+            print(line, file=sys.stderr)
 
     @property
     def files(self) -> tuple[Path, ...]:

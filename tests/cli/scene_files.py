@@ -49,6 +49,7 @@ def own_files(folder: Path, routes: str = ROUTES, more: str = "") -> Path:
     (folder / "my.rou.xml").write_text(routes)
     file = folder / "my.sumocfg"
     file.write_text(
-        f'<configuration><net-file value="{net.name}"/><route-files value="my.rou.xml"/>{more}</configuration>'
+        f'<configuration><net-file value="{net.name}"/><route-files value="my.rou.xml"/>'
+        f'<step-length value="0.1"/>{more}</configuration>'
     )
     return file

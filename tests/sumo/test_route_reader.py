@@ -151,9 +151,16 @@ def test_mistakes_in_the_configuration_are_named(tmp_path, old, new, expected):
         read_sumocfg(write(tmp_path, config=CONFIG.replace(old, new)))
 
 
-@pytest.mark.parametrize(("step", "said"), [("0.25", "step-length 0.25 s is not used: a cycle is 0.1 s"), ("0.1", "")])
-def test_another_step_is_not_taken_silently(tmp_path, step, said, capsys):
-    file = write(tmp_path, config=CONFIG.replace("</input>", f'<step-length value="{step}"/></input>'))
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ('<step-length value="0.25"/>', "step-length 0.25 s is not used: a cycle is 0.1 s"),
+        ('<step-length value="0.1"/>', ""),
+        ("", "step-length 1 s (SUMO's default) is not used: a cycle is 0.1 s"),
+    ],
+)
+def test_another_step_is_not_taken_silently(tmp_path, given, said, capsys):
+    file = write(tmp_path, config=CONFIG.replace("</input>", f"{given}</input>"))
     load_scenario(file)
     assert capsys.readouterr().err == (f"{file}: {said}\n" if said else "")
 
