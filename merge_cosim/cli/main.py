@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
@@ -356,6 +357,12 @@ def refusal(error: Exception) -> str | None:
     return str(line) if line else None
 
 
+@cache
+def _command() -> Any:
+    """The application as typer builds it, once for all calls in a process."""
+    return typer.main.get_command(app)
+
+
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
     import io
@@ -371,7 +378,7 @@ def main() -> None:
     for name in ("LIBSUMO_AS_TRACI", "LIBTRACI_AS_TRACI"):
         os.environ.pop(name, None)  # with them `import traci` gives another module, and prints that it does
     try:
-        sys.exit(app(standalone_mode=False))
+        sys.exit(_command()(standalone_mode=False))
     except USAGE_ERROR as error:
         message = error.format_message()
         if "\n" in message:  # the help, for want of any argument

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -235,6 +235,12 @@ def read_net(path: Path) -> sumolib.net.Net:
         raise UserError(f"{path}: no such net; build it with: merge-cosim ramp build {path.parent}")
     if (root := root_element(path)).tag != "net":
         raise UserError(f"{path}: its root is <{root.tag}>, not <net>; give a .net.xml")
+    return _net_of(path, path.read_bytes())
+
+
+@lru_cache(maxsize=8)
+def _net_of(path: Path, _content: bytes) -> sumolib.net.Net:
+    """A net, parsed once as long as its file is the same: a sweep and `ramp describe` ask many times."""
     return parsed_net(path, path)
 
 

@@ -13,6 +13,7 @@ import pytest
 import sumo
 import sumolib
 from command import merge_cosim, refused, run_process
+from lxml import etree
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.ramps.ramp import Ramp
@@ -150,13 +151,14 @@ def scene(tmp_path_factory):
 def test_fcd_of_a_scene_has_all_cars_and_the_record_of_its_meetings(scene):
     folder, facts, record = scene
     ramp, seen, cars = Ramp.load("us101"), {}, set()
-    for step in sumolib.xml.parse(str(folder / "scene/fcd.xml"), "timestep"):
-        for car in step.vehicle or ():
-            edge, _, lane = car.lane.rpartition("_")
-            cars.add(car.id)
-            if car.id.startswith(("host", "merging")):
-                place = LaneMap(ramp).station(LanePosition(edge, int(lane), float(car.pos)), 0.0)
-                seen[float(step.time), car.id] = (place, float(car.speed))
+    lanes = LaneMap(ramp)
+    for step in etree.parse(folder / "scene/fcd.xml").iter("timestep"):
+        for car in step:
+            cars.add(name := car.get("id"))
+            if name.startswith(("host", "merging")):
+                edge, _, lane = car.get("lane").rpartition("_")
+                place = lanes.station(LanePosition(edge, int(lane), float(car.get("pos"))), 0.0)
+                seen[float(step.get("time")), name] = (place, float(car.get("speed")))
     assert len(cars) == facts["vehicles"]
     assert len(record) > 50
     for row in record:
