@@ -1,7 +1,9 @@
 """What the tests share: the real data where it is at hand, and a cache of their own."""
 
 import os
+import subprocess
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,12 +16,32 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
-def pytest_configure() -> None:
+COMPILING = ("sweep", "designed-random", "--method", "interactive,dbn-pf,ipcb", "--set", "encounters.count=1")
+
+
+def pytest_configure(config: pytest.Config) -> None:
     """Two processes of tests share two cores with SUMO, so no example has a deadline."""
     from hypothesis import settings
 
     settings.register_profile("unhurried", deadline=None)
     settings.load_profile("unhurried")
+    if config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        compile_kernels(config)
+
+
+def compile_kernels(config: pytest.Config) -> None:
+    """Compile the kernels once, while the processes of tests start, each of which would compile them otherwise."""
+    folder = tempfile.TemporaryDirectory()
+    config.add_cleanup(folder.cleanup)
+    command = [sys.executable, "-m", "merge_cosim", *COMPILING, "--jobs", "1", "--world", "closed-form", "--out", "out"]
+    quiet = subprocess.DEVNULL
+    config.add_cleanup(subprocess.Popen(command, cwd=folder.name, stdout=quiet, stderr=quiet).wait)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Slow tests come first where several processes share the tests, so that they end together."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
 @pytest.fixture(scope="session")
