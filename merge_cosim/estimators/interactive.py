@@ -122,9 +122,11 @@ class Interactive(ReactingDriver, Estimator):
         from merge_cosim.estimators.compiled.type_filter import update
 
         log_odds = np.empty(len(seen.merging_speed))
-        states = seen.host_station, seen.host_speed, seen.merging_station, seen.merging_speed
         update(
-            *(state.copy() for state in states),  # numba compiles anew for arrays that are read-only, as a world's are
+            seen.host_station.copy(),  # numba compiles anew for arrays that are read-only, as those of a world are
+            seen.host_speed.copy(),
+            seen.merging_station.copy(),
+            seen.merging_speed.copy(),
             seen.host_length,
             self._kinds,
             self._traits,

@@ -10,6 +10,7 @@ Commands are run for real, in this process, in a shorter form:
 - what opens a window, takes minutes or asks the network (`PARSED`) is only parsed: `--help` is added, before which
   typer refuses a command or an option that there is not; `--gui` is left out after that;
 - of `make TARGET` the lines that `make` would run are taken: those of `merge-cosim` are run in turn;
+- figures for a paper are written in one format;
 - a route configuration for `sumo-gui` is run by `sumo`;
 - `pip install` must ask for extras that there are.
 """
@@ -22,9 +23,12 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import sumolib
 from command import merge_cosim
+
+from merge_cosim.report import figures
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(?P<language>\w*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -111,7 +115,8 @@ def _merge_cosim(words: list[str], folder: Path) -> subprocess.CompletedProcess[
         fewer = dict.fromkeys(setting for word in words for setting in FEWER.get(word, ()))
         words += [w for setting in fewer if setting.partition("=")[0] not in asked for w in ("--set", setting)]
         words += ["--jobs", "1"] if "--dask" not in words else []
-    return merge_cosim(*words, cwd=folder)
+    with patch.object(figures, "FORMATS", ("pdf",)):
+        return merge_cosim(*words, cwd=folder)
 
 
 def _process(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:

@@ -23,6 +23,8 @@ import surrogate_page
 import traffic_page
 from PIL import Image
 
+from merge_cosim.report import figures
+
 DOCS = Path(__file__).parents[2] / "docs"
 
 
@@ -149,12 +151,13 @@ def test_methods(tmp_path):
 
 
 @pytest.mark.slow
-def test_gallery(tmp_path):
+def test_gallery(tmp_path, monkeypatch):
     pytest.importorskip("playwright.sync_api")
     import gallery_page
 
     if gallery_page.CHROMIUM is None:
         pytest.skip("Chromium is not installed")
+    monkeypatch.setattr(figures, "FORMATS", ("png",))  # the gallery's pictures
     gallery_page.main(["--short", "--docs", str(tmp_path)])
     text = (DOCS / "gallery.md").read_text(encoding="utf-8")
     made = {str(file.relative_to(tmp_path)) for file in tmp_path.rglob("*.png")}
