@@ -331,7 +331,9 @@ def _loops(found: Mapping[str, Any]) -> str:
     ]
     return _table(rows) + (
         f"\nOurs: {found['vehicle_steps_per_s']:,} vehicle-steps per second; wall time over the time inside "
-        f"`simulationStep` of the same run: **{found['ratio_to_bare_sumo']}**.\n"
+        f"`simulationStep` of the same run: **{found['ratio_to_bare_sumo']}**.\nBare step and calls alone: "
+        f"**{found['steps_and_calls_to_bare_sumo']}**, with the calls that place, command and read each car, the "
+        f"least\nthat a loop by these calls can take. The rest is estimating, deciding, recording and scoring.\n"
     )
 
 

@@ -84,6 +84,7 @@ def compare(cases: int, sample: int, rounds: int) -> dict[str, Any]:
         "us_per_vehicle_step": round(own, 3),
         "cpu_us_per_vehicle_step": round(own_cpu, 3),
         "ratio_to_bare_sumo": round(median(effort.wall_s / effort.step_s for effort in efforts), 3),
+        "steps_and_calls_to_bare_sumo": round(median(1.0 + one.calls_s / one.step_s for one in efforts), 3),
         **{f"{name}_us_per_vehicle_step": round(time, 3) for name, time in theirs.items()},
         **{f"{name}_cpu_us_per_vehicle_step": round(time, 3) for name, time in their_cpu.items()},
         **{f"speedup_vs_{name}": round(time / own, 2) for name, time in theirs.items()},

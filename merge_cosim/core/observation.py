@@ -69,5 +69,6 @@ class Observation:
     @property
     def gap(self) -> FloatArray:
         """Bumper-to-bumper distance [m] from the car behind to the car ahead; negative where the bodies overlap."""
-        leader_length = np.where(self.merging_ahead, self.merging_length, self.host_length)
-        return np.abs(self.merging_station - self.host_station) - leader_length
+        ahead_by = self.merging_station - self.host_station  # taken once, `merging_ahead` would take it again
+        leader_length = np.where(ahead_by >= -TOLERANCE, self.merging_length, self.host_length)
+        return np.abs(ahead_by) - leader_length

@@ -40,6 +40,7 @@ class Effort:
         wall_s: Time in the loop [s].
         cpu_s: Processor time in the loop [s].
         step_s: Of it, inside the steps of SUMO [s].
+        calls_s: Of it, inside the calls that place, command and read cars, see `World.calls_s` [s].
         method_s: Of it, in estimating and controlling [s].
         scene_s: Simulated time of scenes [s].
         worst_difference_m: Largest difference of the world's stations from the closed form, at an encounter's end [m].
@@ -50,6 +51,7 @@ class Effort:
     wall_s: float = 0.0
     cpu_s: float = 0.0
     step_s: float = 0.0
+    calls_s: float = 0.0
     method_s: float = 0.0
     scene_s: float = 0.0
     worst_difference_m: float = 0.0
@@ -61,6 +63,7 @@ class Effort:
         self.wall_s += other.wall_s
         self.cpu_s += other.cpu_s
         self.step_s += other.step_s
+        self.calls_s += other.calls_s
         self.method_s += other.method_s
         self.scene_s += other.scene_s
         self.worst_difference_m = max(self.worst_difference_m, other.worst_difference_m)
@@ -141,7 +144,7 @@ class Loop:
         self._age, self._over_at = np.zeros((2, 0), dtype=np.int64)
         self._active, self._open = np.zeros((2, 0), dtype=bool)
         self._make_room()
-        self._effort, self._stepped = Effort(), world.step_s
+        self._effort, self._stepped, self._called = Effort(), world.step_s, world.calls_s
         self._over: dict[int, FloatArray] = {}
         slot_each = encounters is not None and world.slots >= len(encounters)
         self._last = np.full(world.slots, -1) if slot_each and traced == () else None
@@ -212,7 +215,7 @@ class Loop:
         world, effort = self._world, self._effort
         if world.vehicle_steps is not None:
             effort.vehicle_steps = world.vehicle_steps
-        effort.step_s = world.step_s - self._stepped
+        effort.step_s, effort.calls_s = world.step_s - self._stepped, world.calls_s - self._called
         effort.worst_difference_m = world.worst_difference_m
         columns = self._columns | world.columns()
         return Run(world.encounters, columns, effort, world.kind, self._broken | world.broken(), self._traces)
@@ -258,13 +261,14 @@ class Loop:
             before = self._origin[slots]
             self._last[before], self._cases[before] = last, ended.cases
             return
+        ages, names = self._age[slots].tolist(), ended.names.tolist()
         for number, (slot, case, end) in enumerate(
             zip(slots.tolist(), ended.cases.tolist(), last.tolist(), strict=True)
         ):
-            name = str(ended.names[number])
+            name = str(names[number])
             if case < 0 and name not in self._traced:
                 continue
-            track = self._recorder.track(slot, int(self._age[slot]))
+            track = self._recorder.track(slot, ages[number])
             if ended.points is not None:  # counted from there, it may have been over earlier or later
                 track = self._world.settled(track[:, : int(valid[number]) + 1], float(ended.points[number]))
                 end = end_of(self._recorder.states(track, slot), self._rules)

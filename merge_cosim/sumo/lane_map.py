@@ -182,19 +182,29 @@ class AlongPaths:
         self._edge_start = self._starts[self._edge]
         self._position = np.zeros(2 * count)
 
-    def put(self, rows: IntArray, where: Sequence[LanePosition]) -> None:
-        """Note that cars on one of the paths were placed, one at each of `rows`."""
-        numbers = self._numbers[rows[0] // self._count]
-        edge = [numbers[one.edge] for one in where]
-        self._edge[rows] = edge
-        self._edge_start[rows] = self._starts[edge]
-        self._position[rows] = [one.position for one in where]
+    def put(self, rows: Sequence[int], where: Sequence[LanePosition]) -> None:
+        """Note that cars were placed, one at each of `rows`."""
+        chosen = np.array(rows)
+        edges = [self._numbers[row // self._count][one.edge] for row, one in zip(rows, where, strict=True)]
+        self._edge[chosen] = edges
+        self._edge_start[chosen] = self._starts[edges]
+        self._position[chosen] = [one.position for one in where]
 
-    def x(self, position: FloatArray) -> FloatArray:
-        """X of all cars [m] from their lane positions after a step, shape (2 count,) both."""
+    def x(self, position: FloatArray, rows: IntArray | None = None) -> FloatArray:
+        """X of all cars [m], shape (2 count,), from their lane positions after a step.
+
+        Args:
+            position: Lane positions [m], shape (2 count,), or of the cars at `rows` alone: the others stand.
+            rows: Those cars; None for all.
+        """
+        if rows is not None:
+            held = self._position.copy()
+            held[rows] = position
+            position = held
         crossed = np.flatnonzero(position < self._position)
         if len(crossed):
-            self._edge[crossed] += 1
-            self._edge_start[crossed] = self._starts[self._edge[crossed]]
+            edge = self._edge[crossed] + 1
+            self._edge[crossed] = edge
+            self._edge_start[crossed] = self._starts[edge]
         self._position = position
         return position + self._edge_start

@@ -185,6 +185,13 @@ class Session:
         if speed is not None:
             self._set_previous_speed(car, speed)
 
+    def place_all(
+        self, cars: Sequence[str], lanes: Sequence[str], positions: Sequence[float], speeds: Sequence[float]
+    ) -> None:
+        """Do the same for many cars."""
+        deque(map(self._move_to, cars, lanes, positions), maxlen=0)
+        deque(map(self._set_previous_speed, cars, speeds), maxlen=0)
+
     def change_lane(self, car: str, index: int) -> None:
         """Bring a car to the lane `index` of its edge within the next step."""
         self._api.vehicle.changeLane(car, index, 0.0)

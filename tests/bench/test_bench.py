@@ -31,6 +31,7 @@ def test_every_figure_is_there_and_on_the_page(tmp_path, monkeypatch):
     for name in ("ratio_to_bare_sumo", "speedup_vs_scalar", "speedup_vs_restart", "speedup_vs_traci"):
         assert found[name] > 0  # how large they are is for the bench to say, not for a test
     assert found["vehicle_steps_per_s"] > 0
+    assert 1.0 < found["steps_and_calls_to_bare_sumo"] < found["ratio_to_bare_sumo"]
     assert {row["estimator"] for row in found["estimators"]} == set(estimators.names())
     assert all(row["full_batch_us"] > 0 for row in found["estimators"])
     assert [(row["cases"], row["processes"]) for row in found["scaling"]] == [(1, 1), (1, 2)]

@@ -82,6 +82,7 @@ class World(ABC):
         slots: Number of slots; it may grow.
         commanded: The hosts are driven by the method, so its bounds of acceleration are checked.
         step_s: Time [s] inside the simulator's steps, without the time to command and to read cars.
+        calls_s: Time [s] inside the calls that place, command and read cars, where the world takes it.
         vehicle_steps: Cars times steps, where the world counts them; None for the two cars of each encounter.
         shown: It is shown in a window, which also shows what the hosts believe and decide.
         worst_difference_m: Largest difference of the stations from the closed form, at an encounter's end [m].
@@ -93,6 +94,7 @@ class World(ABC):
     commanded: ClassVar[bool] = True
     slots: int
     step_s: float = 0.0
+    calls_s: float = 0.0
     vehicle_steps: int | None = None
     shown: bool = False
     worst_difference_m: float = 0.0

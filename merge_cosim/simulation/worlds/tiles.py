@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import repeat
 from time import perf_counter
 
 import numpy as np
 
+from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.errors import UserError
-from merge_cosim.core.observation import DECIMALS
+from merge_cosim.core.observation import DECIMALS, Setting
 from merge_cosim.core.units import DT, TOLERANCE, FloatArray, IntArray
 from merge_cosim.ramps.ramp import Ramp, Way
-from merge_cosim.simulation.worlds.base import Ended, GivenWorld
-from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, Part
+from merge_cosim.scoring.rules import Rules
+from merge_cosim.simulation.leader import LeaderRule
+from merge_cosim.simulation.worlds.base import Begun, Ended, GivenWorld
+from merge_cosim.sumo.lane_map import AlongPaths, LaneMap, LanePosition, Part
 from merge_cosim.sumo.options import SumoOptions
 from merge_cosim.sumo.session import Car, Errors, Session
 from merge_cosim.sumo.start import LibsumoSession, one_line
@@ -77,31 +79,62 @@ class TiledWorld(GivenWorld):
             check = f"see what 'merge-cosim ramp check {ramp.net.parent}' says"
             raise UserError(f"{ramp.net}: SUMO cannot drive the ramp's paths: {one_line(error)}; {check}") from None
         self._lanes, self._along = LaneMap(ramp), AlongPaths(ramp, slots, self._paths)
-        self._merge_position = np.zeros(2 * slots)
-        self._length = np.full(2 * slots, np.nan)
+        self._starts: list[list[LanePosition]] = []
+        self._driven = self._names
+        """Names of the cars that are commanded and read."""
+        self._rows: IntArray | None = None
+        """Their rows; None for all."""
+        self._merge_position = np.zeros(slots)
+        self._length = np.full((2, slots), np.nan)
         self._in_host_lane = np.ones(slots, dtype=bool)
         self.state = np.zeros((4, slots))
         self._closed_form = np.zeros((2, slots))
 
+    def start(
+        self, encounters: Encounters | None, setting: Setting, rules: Rules, leader: LeaderRule, seed: int
+    ) -> None:
+        """See `World`; looks up where the cars start, as many share a place."""
+        super().start(encounters, setting, rules, leader, seed)
+        self._starts = []
+        for path, station in zip(self._paths, self.encounters.start, strict=False):
+            places = [*zip(station.tolist(), self.encounters.merge_position.tolist(), strict=True)]
+            known = {place: self._lanes.place(path, *place) for place in set(places)}
+            self._starts.append([known[place] for place in places])
+
+    def restart(self) -> None:
+        """See `GivenWorld`."""
+        super().restart()
+        self._driven, self._rows = self._names, None
+
+    def begin(self) -> Begun | None:
+        """See `World`; once nothing is left to begin, the cars of free tiles stand, neither commanded nor read."""
+        begun = super().begin()
+        if begun is not None:
+            self._driven, self._rows = self._names, None
+        if len(self._free) and not len(self._queue):
+            self._park()
+        return begun
+
     def place(self, slots: IntArray, cases: IntArray) -> FloatArray:
         """See `GivenWorld`."""
-        start = self.encounters.start[:, cases]
+        start = self.encounters.start.take(cases, axis=1)
         self.state[:, slots] = start[:4]
         self._closed_form[:, slots] = start[:2]
         self._in_host_lane[slots] = not self.ramp.changes_lane
-        merge_position = self.encounters.merge_position[cases]
-        for car, path in enumerate(self._paths):
-            rows = slots + car * self.slots
-            self._merge_position[rows] = merge_position
-            station, speed, length = start[car::2]
-            where = [*map(self._lanes.place, repeat(path), station.tolist(), merge_position.tolist())]
-            self._along.put(rows, where)
-            for row, one, own_speed in zip(rows.tolist(), where, speed.tolist(), strict=True):
-                lane = self._id(row % self.slots, f"{one.edge}_{one.lane}")
-                self.session.place(self._names[row], lane, one.position, own_speed)
-            for other in np.flatnonzero(self._length[rows] != length).tolist():
-                self.session.set_length(self._names[rows[other]], float(length[other]))
-            self._length[rows] = length
+        self._merge_position[slots] = self.encounters.merge_position[cases]
+        rows = [*slots.tolist(), *(slots + self.slots).tolist()]
+        names, numbers = [self._names[row] for row in rows], cases.tolist()
+        where = [starts[number] for starts in self._starts for number in numbers]
+        lanes = [self._id(row % self.slots, f"{one.edge}_{one.lane}") for row, one in zip(rows, where, strict=True)]
+        self._along.put(rows, where)
+        positions, speeds = [one.position for one in where], start[2:4].ravel().tolist()
+        begin = perf_counter()
+        self.session.place_all(names, lanes, positions, speeds)
+        self.calls_s += perf_counter() - begin
+        length = start[4:]
+        for other in np.flatnonzero(self._length[:, slots] != length).tolist():
+            self.session.set_length(names[other], float(length.flat[other]))
+        self._length[:, slots] = length
         return np.empty((0, len(slots)))
 
     def command(self, speeds: FloatArray) -> None:
@@ -110,7 +143,11 @@ class TiledWorld(GivenWorld):
         if self.ramp.changes_lane:
             self._change_lanes(self.state[self._by_ramp] + way[self._by_ramp])
         self._closed_form += way
-        self.session.command(self._names, speeds.ravel().tolist())
+        speeds = speeds.ravel()
+        driven = (speeds if self._rows is None else speeds[self._rows]).tolist()
+        begin = perf_counter()
+        self.session.command(self._driven, driven)
+        self.calls_s += perf_counter() - begin
 
     def step(self) -> None:
         """See `World`."""
@@ -157,16 +194,13 @@ class TiledWorld(GivenWorld):
         by_main, by_ramp = (1 - self._by_ramp) * self.slots, self._by_ramp * self.slots
         past = self.state[self._by_ramp, slots]  # of the place where the merging car comes onto the host's lane
         if not self.ramp.changes_lane:
-            past = past + self._merge_position[slots + by_ramp]
-        for slot, way in zip(slots.tolist(), past.tolist(), strict=True):
+            past = past + self._merge_position[slots]
+        lanes = [self._lanes[self.session.lane(self._names[row])] for row in [*(slots + by_main), *(slots + by_ramp)]]
+        parts = [lane.part if lane else None for lane in lanes]
+        for slot, way, main, ramp in zip(slots.tolist(), past.tolist(), parts, parts[len(slots) :], strict=False):
             due = Part.HOST if way > 0.0 else Part.MERGING
-            as_due = self._part(slot + by_main) is Part.HOST
-            if not (as_due and (abs(way) <= TOLERANCE or self._part(slot + by_ramp) is due)):
+            if not (main is Part.HOST and (abs(way) <= TOLERANCE or ramp is due)):
                 self.breaks("lane", np.array([slot]))
-
-    def _part(self, row: int) -> Part | None:
-        lane = self._lanes[self.session.lane(self._names[row])]
-        return lane.part if lane else None
 
     def _change_lanes(self, reached: FloatArray) -> None:
         """Command the lane changes of this cycle; `reached`: stations of the cars from the ramp at its end [m]."""
@@ -179,12 +213,21 @@ class TiledWorld(GivenWorld):
             self.session.change_lane(name, self._lanes.host_lane(edge) - grows)
         self._in_host_lane |= arrives
 
+    def _park(self) -> None:
+        """Let the cars of free tiles stand."""
+        busy = np.tile(self._case >= 0, 2)
+        idle, self._rows = np.flatnonzero(~busy).tolist(), np.flatnonzero(busy)
+        self.session.command([self._names[row] for row in idle], [0.0] * len(idle))
+        self._driven = [self._names[row] for row in self._rows.tolist()]
+
     def _read(self) -> None:
+        begin = perf_counter()
         try:
-            position = np.fromiter(self.session.positions(self._names), np.float64, 2 * self.slots)
+            position = np.fromiter(self.session.positions(self._driven), np.float64, len(self._driven))
         except self.session.errors:
             raise self._gone() from None
-        station = (self._along.x(position) - self._merge_position).reshape(2, self.slots)
+        self.calls_s += perf_counter() - begin
+        station = self._along.x(position, self._rows).reshape(2, self.slots) - self._merge_position
         np.subtract(station, self.state[:2], out=self.state[2:])
         self.state[2:] /= DT
         self.state[:2] = station
