@@ -4,8 +4,11 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
@@ -77,3 +80,18 @@ def short_surrogate() -> None:
 
     for name, recipe in RECIPES.items():
         RECIPES[name] = replace(recipe, seeds=recipe.seeds[:1], duration=300.0)
+
+
+@pytest.fixture(autouse=True)
+def own_registries() -> Iterator[None]:
+    """What a test registers is gone after it: another may use the name, or list all methods."""
+    from merge_cosim.controllers.base import controllers
+    from merge_cosim.estimators.base import estimators
+    from merge_cosim.merging_cars.base import merging_cars
+    from merge_cosim.sensors.base import sensors
+
+    with ExitStack() as stack:
+        for registry in (estimators, controllers, merging_cars, sensors):
+            registry.names()  # ours are registered from now on
+            stack.enter_context(patch.dict(registry._classes))
+        yield

@@ -32,6 +32,7 @@ def test_the_outcome_is_that_of_our_own_sumo(tmp_path):
     assert (tmp_path / "attached.csv").read_bytes() == (tmp_path / "own.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_it_is_the_same_beside_other_traffic_and_in_an_auxiliary_lane(tmp_path):
     name = plan(SweepRequest(["us101-replay"], ["acc"], source="surrogate"))[0].case(0)
     case = ("run", "us101-replay", "--source", "surrogate", "--case", name, "--method", "acc", "--json")

@@ -34,6 +34,7 @@ def table(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(lines))
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_page(tmp_path: Path) -> None:
     (block,) = re.findall(r"```sh\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     script = block.replace("--out", "--set encounters.end=100 --out")
@@ -59,6 +60,7 @@ def test_a_folder_by_a_shipped_ramps_name_is_ones_own(tmp_path: Path) -> None:
     assert scene["hosts"] > 0
 
 
+@pytest.mark.slow
 def test_a_motorway_from_openstreetmap(tmp_path: Path) -> None:
     """Cars and trucks from seven route files on a net with more than the ramp; the configuration talks and errs."""
     game(tmp_path, "A10KW", "--link", "24498409")

@@ -52,6 +52,7 @@ SUMMARY_CONTRACT = [
 ]
 
 
+@pytest.mark.slow
 def test_a_sweep_writes_the_promised_files(tmp_path):
     scenario = small_scenario(tmp_path)
     done = merge_cosim("sweep", scenario, "--out", "out", "--json", cwd=tmp_path)

@@ -42,6 +42,7 @@ def rewrite(folder, change):
     pq.write_table(rows.replace_schema_metadata(table.schema.metadata), folder / "results.parquet")
 
 
+@pytest.mark.slow
 def test_a_changed_value_is_found_and_changed_versions_are_named(swept):
     manifest = json.loads((swept / "manifest.json").read_text())
     assert manifest["world"] == "closed-form"

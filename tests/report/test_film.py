@@ -46,6 +46,7 @@ def test_the_car_ahead_is_drawn_at_its_gap(in_scene):
     assert len(next(iter(drawn.stills(1))).axes[0].collections[0].get_paths()) == len(drawn._others[1])
 
 
+@pytest.mark.slow
 def test_a_meeting_in_traffic_has_other_cars_with_the_lengths_of_their_types(tmp_path):
     scene = mc.load_scenario("traffic-light", {"encounters.demand.duration": 120})
     results = mc.sweep([scene], ["acc"], jobs=1)

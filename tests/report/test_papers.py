@@ -24,6 +24,7 @@ from merge_cosim.studies.reproduction import DESIGNED, MODEL_SWEEP, NODE_SWEEP, 
 from merge_cosim.studies.training import train
 from merge_cosim.sweeps.sweep import SweepRequest
 
+pytestmark = pytest.mark.slow
 METHODS = ("acc", "slot", "ipcb", "pgm-g", "pgm", "fg", "fg-gmm", "always-go", "human")
 COARSE = {f"encounters.{name}.step": 12 for name in ("host_speed", "merging_speed")} | {
     "encounters.host_offset.step": 5

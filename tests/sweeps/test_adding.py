@@ -40,6 +40,7 @@ def same(one, other):
         assert identity[0][name] == identity[1][name], name
 
 
+@pytest.mark.slow
 def test_added_methods_scenarios_and_variations_give_the_rows_of_one_sweep(tmp_path, monkeypatch):
     for module in (parts, merged_rows):
         monkeypatch.setattr(module, "STRETCH_ROWS", 20)

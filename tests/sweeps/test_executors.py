@@ -17,7 +17,6 @@ import pytest
 from command import COMMAND
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.estimators.base import estimators
 from merge_cosim.results.schema import KEY
 from merge_cosim.simulation.loop import Effort
 from merge_cosim.sweeps.chunks import ChunkQueue, cut
@@ -153,12 +152,6 @@ def test_a_worker_without_memory_for_a_thread_does_not_wait_for_it():
     )
 
 
-@pytest.fixture
-def own_registry(monkeypatch):
-    """What a test registers is gone after it: no other test of this process is to run a deadly estimator."""
-    monkeypatch.setattr(estimators, "_classes", {name: estimators[name] for name in estimators.names()})
-
-
 ENDED_AT_ONCE = """
 import os, signal
 from merge_cosim.cli.interrupts import ended_by_signal
@@ -194,14 +187,15 @@ def test_an_interpreter_that_cannot_start_is_one_line(tmp_path, monkeypatch, cap
     assert capfd.readouterr().err == "here"  # nothing else, and standard error is what it was
 
 
-def test_a_worker_prints_on_the_standard_error_of_its_parent(tmp_path, own_registry, capfd):
+def test_a_worker_prints_on_the_standard_error_of_its_parent(tmp_path, capfd):
     plugin = tmp_path / "loud.py"
     plugin.write_text("import os, multiprocessing\nif multiprocessing.parent_process(): os.write(2, b'of a worker')\n")
     list(Processes(1, [plugin]).run(ChunkQueue(chunks(["always-go"], 120))))
     assert capfd.readouterr().err == "of a worker"
 
 
-def test_a_piece_that_kills_every_worker_ends_the_sweep_with_a_clear_line(tmp_path, own_registry):
+@pytest.mark.slow
+def test_a_piece_that_kills_every_worker_ends_the_sweep_with_a_clear_line(tmp_path):
     plugin = tmp_path / "deadly.py"
     plugin.write_text(
         """
@@ -226,7 +220,7 @@ class Deadly(Estimator):
         list(Processes(2, [plugin]).run(queue))
 
 
-def test_an_error_of_a_plugin_in_a_worker_names_its_line(tmp_path, own_registry):
+def test_an_error_of_a_plugin_in_a_worker_names_its_line(tmp_path):
     plugin = tmp_path / "faulty.py"
     plugin.write_text(
         """

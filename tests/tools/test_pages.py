@@ -67,6 +67,7 @@ def test_sensitivity(tmp_path):
     assert "| **clear** |" in text
 
 
+@pytest.mark.slow
 def test_ranking(tmp_path):
     ranking_page.main(["--short", "--docs", str(tmp_path)])
     text = made_like(tmp_path, "ranking.md")
@@ -74,6 +75,7 @@ def test_ranking(tmp_path):
     assert "| slot-time |" in text
 
 
+@pytest.mark.slow
 def test_robustness(tmp_path, monkeypatch):
     for name in ("SENSING", "SHIFTED"):
         words = ["acc,pgm" if word.startswith("acc,") else word for word in getattr(robustness_page, name)]
@@ -137,6 +139,7 @@ def test_method_proof(tmp_path):
     assert text.count("driven: **") >= 3
 
 
+@pytest.mark.slow
 def test_traffic(tmp_path):
     traffic_page.main(["--short", "--docs", str(tmp_path)])
     text = made_like(tmp_path, "traffic.md")
@@ -196,6 +199,7 @@ def test_surrogate(tmp_path, data_dir):
     assert len(re.findall(r"^\| real \|", text, flags=re.MULTILINE)) == 2  # the pairs, and how well the order is found
 
 
+@pytest.mark.slow
 def test_scenes(tmp_path, data_dir):
     out = tmp_path / "out"
     scenes_page.main(["--short", "--docs", str(tmp_path), "--data", str(data_dir), "--out", str(out), "--jobs", "1"])
