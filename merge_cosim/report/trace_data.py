@@ -55,8 +55,7 @@ def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> list[dict[str
     """
     if traces.empty:
         return []
-    recorded = results["case"].isin(traces["case"].unique())
-    rows = results[recorded & (results["variation"] == "")].drop_duplicates(
+    rows = results[results["variation"] == ""].drop_duplicates(
         ["scenario", "case", "method"]
     )  # of several models the first
     rows = rows.set_index(["scenario", "case", "method"]).sort_index()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,14 +54,15 @@ class Watched:
         return Watched(self.log_odds[here], self.distance[here], self.margin[here], self.not_yield[here])
 
 
-def open_loop(estimator: Estimator, encounters: Encounters) -> Watched:
-    """Run an estimator on the logs, without driving."""
-    log, n = encounters.log, len(encounters)
+def logged(encounters: Encounters) -> Iterator[tuple[Observation, BoolArray]]:
+    """What a host would observe where both cars drive as logged, cycle by cycle.
+
+    With it, where the log goes on and neither car has reached the merging point, shape (n,); the last cycle of a log
+    that is over is repeated.
+    """
+    log = encounters.log
     assert log is not None
-    estimator.start(n, Setting())
-    estimator.reset(np.arange(n), encounters.label, stream_keys(encounters.case, 0))
     both = np.minimum(log.merging_station.lengths, log.host_station.lengths)
-    parts = []
     for cycle in range(int(both.max()) - 1):
         now = np.minimum(cycle, both - 2)
         host, merging = log.host_station, log.merging_station
@@ -73,8 +75,17 @@ def open_loop(estimator: Estimator, encounters: Encounters) -> Watched:
             host_length=encounters.host_length,
             merging_length=encounters.merging_length,
         )
+        yield seen, (cycle < both - 1) & (seen.host_station < 0) & (seen.merging_station < 0)
+
+
+def open_loop(estimator: Estimator, encounters: Encounters) -> Watched:
+    """Run an estimator on the logs, without driving."""
+    n = len(encounters)
+    estimator.start(n, Setting())
+    estimator.reset(np.arange(n), encounters.label, stream_keys(encounters.case, 0))
+    parts = []
+    for seen, use in logged(encounters):
         odds = estimator.update(seen)
-        use = (cycle < both - 1) & (seen.host_station < 0) & (seen.merging_station < 0)
         margin = seen.host_arrival - seen.merging_arrival
         parts.append((odds[use], -seen.merging_station[use], margin[use], encounters.label[use] == Intention.NOT_YIELD))
     return Watched(*(np.concatenate(column) for column in zip(*parts, strict=True)))

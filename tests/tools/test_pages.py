@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import blocks
+import driver_fit
 import geometry_page
 import headroom_page
 import kept_aside_page
@@ -137,6 +138,18 @@ def test_method_proof(tmp_path):
     assert re.search(r"^\| designed-2 \| interactive \| 18 \|", text, flags=re.MULTILINE)
     assert re.search(r"^\| designed-2 \| ipcb \| 6875 \|", text, flags=re.MULTILINE)  # a row that stays
     assert text.count("driven: **") >= 3
+
+
+def test_driver_fit(tmp_path):
+    driver_fit.main(["--short", "--docs", str(tmp_path)])
+    text = made_like(tmp_path, "methods/interactive.md")
+    assert "training, US-101 (surrogate): " in text
+    losses = re.search(
+        r"^\| log lik.*?^\| shipped \| (\S+).*?^\| fitted \| (\S+)", text, flags=re.MULTILINE | re.DOTALL
+    )
+    assert losses is not None
+    assert float(losses[2]) > float(losses[1])
+    assert re.search(r"^\| designed-3 \(random\) \| fitted \| 20 \|", text, flags=re.MULTILINE)
 
 
 @pytest.mark.slow

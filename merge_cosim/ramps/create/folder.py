@@ -76,11 +76,8 @@ def write_ramp(
         for file, text in files.items():
             (made / file).write_text(text, encoding="utf-8")
         copy_view(pattern, made)
-        try:
-            build(made)
-            require_checked(made, folder)
-        except UserError as error:
-            raise UserError(str(error).replace(str(made), str(folder))) from None
+        build(made)
+        require_checked(made, folder)
         draw(made)
         try:
             shutil.copytree(made, folder, dirs_exist_ok=True)
@@ -90,14 +87,14 @@ def write_ramp(
 
 
 def require_checked(folder: Path, named: Path) -> None:
-    """Refuse a ramp that `ramp check` finds a problem of; `named` is the file or folder that the error line names.
+    """Refuse a ramp that `ramp check` finds a problem of; `named` is the folder in the error line.
 
     Raises:
         UserError: There is a problem; the line holds all of them.
     """
-    problems = [line.replace(f"{folder / FILE_NAME}: ", "") for line in check(folder)]
+    problems = [line.replace(f"{folder / FILE_NAME}: ", "").replace(str(folder), str(named)) for line in check(folder)]
     if problems:
-        raise UserError(f"{named}: no ramp is written, since it would not pass ramp check: {'; '.join(problems)}")
+        raise UserError(f"{named}: not written, since it would not pass ramp check: {'; '.join(problems)}")
 
 
 def document(root: str, comment: str, rows: list[str]) -> str:
