@@ -1,5 +1,6 @@
 """What `ramp check` tells: each problem is one line that names file, key and remedy."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,14 @@ from merge_cosim.ramps.build import build
 from merge_cosim.ramps.check import check, notes
 from merge_cosim.ramps.create.new import RampNumbers, new_ramp
 
-LANE = RampNumbers(lanes=2, acceleration_lane=250.0)
 ON = '<connection from="merge" fromLane="1" to="main_out" toLane="0"/>'
 UP = '<connection from="merge" fromLane="1" to="main_out" toLane="1"/>'
+
+
+@pytest.fixture(scope="module")
+def with_lane(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A ramp with an acceleration lane."""
+    return new_ramp(tmp_path_factory.mktemp("made") / "mine", RampNumbers(lanes=2, acceleration_lane=250.0))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -81,8 +87,10 @@ def change(file: Path, old: str, new: str) -> None:
         ),
     ],
 )
-def test_each_problem_of_the_sources_is_reported(tmp_path: Path, kind: str, old: str, new: str, problem: str) -> None:
-    folder = new_ramp(tmp_path / "mine", LANE)
+def test_each_problem_of_the_sources_is_reported(
+    with_lane: Path, tmp_path: Path, kind: str, old: str, new: str, problem: str
+) -> None:
+    folder = shutil.copytree(with_lane, tmp_path / "mine")
     change(folder / f"mine.{kind}.xml", old, new)
     assert check(folder) == [
         f"{folder / 'mine.net.xml'}: not what its plain XML builds now; build it with: merge-cosim ramp build {folder}"
@@ -128,8 +136,8 @@ def test_a_merging_point_beyond_a_gore_without_a_lane_is_reported(tmp_path: Path
     assert "merging_point: there is no auxiliary lane, so it must be 0.0" in problem
 
 
-def test_an_auxiliary_lane_whose_rest_is_not_listed_is_reported(tmp_path: Path) -> None:
-    folder = new_ramp(tmp_path / "mine", LANE)
+def test_an_auxiliary_lane_whose_rest_is_not_listed_is_reported(with_lane: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(with_lane, tmp_path / "mine")
     change(folder / "ramp.toml", "host_lane = [0, 1, 0]", "host_lane = [0, 1, 1]")
     change(folder / "mine.con.xml", '<connection from="merge" fromLane="2" to="main_out" toLane="1"/>', UP)
     change(folder / "mine.con.xml", ON, ON.replace('fromLane="1"', 'fromLane="0"'))

@@ -17,6 +17,7 @@ from merge_cosim.ngsim.sites import site
 from merge_cosim.report.methods import looks
 from merge_cosim.report.published import published
 from merge_cosim.results.store import RESULTS
+from merge_cosim.studies import reproduction
 from merge_cosim.studies.papers import cases, claims, figures, tables
 from merge_cosim.studies.papers.evidence import Evidence, gather
 from merge_cosim.studies.papers.page import write_reproduction
@@ -209,7 +210,8 @@ def test_discordant_cases(evidence):
     assert found[:2] == (np.sum(go & ~ipcb), np.sum(~go & ipcb))
 
 
-def test_the_studies_keep_sources_apart(tmp_path, data_dir):
+def test_the_studies_keep_sources_apart(tmp_path, data_dir, monkeypatch):
+    monkeypatch.setattr(reproduction, "SPLITS", 2)
     found = studies(data_dir, tmp_path, jobs=1, seed=0)
     assert [study.name for study in found] == [
         "designed",

@@ -77,7 +77,7 @@ def write_ramp(
             (made / file).write_text(text, encoding="utf-8")
         copy_view(pattern, made)
         build(made)
-        require_checked(made, folder)
+        require_checked(made, folder, just_built=True)
         draw(made)
         try:
             shutil.copytree(made, folder, dirs_exist_ok=True)
@@ -86,13 +86,14 @@ def write_ramp(
     return folder
 
 
-def require_checked(folder: Path, named: Path) -> None:
-    """Refuse a ramp that `ramp check` finds a problem of; `named` is the folder in the error line.
+def require_checked(folder: Path, named: Path, just_built: bool = False) -> None:
+    """Refuse a ramp that `check` finds a problem of; `named` is the folder in the error line.
 
     Raises:
         UserError: There is a problem; the line holds all of them.
     """
-    problems = [line.replace(f"{folder / FILE_NAME}: ", "").replace(str(folder), str(named)) for line in check(folder)]
+    found = check(folder, just_built)
+    problems = [line.replace(f"{folder / FILE_NAME}: ", "").replace(str(folder), str(named)) for line in found]
     if problems:
         raise UserError(f"{named}: not written, since it would not pass ramp check: {'; '.join(problems)}")
 
