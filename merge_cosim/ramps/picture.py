@@ -47,7 +47,8 @@ def draw(folder: Path) -> Path:
     file = read_ramp_file(folder)
     ramp, net = Ramp.from_file(folder, file), read_net(folder / file.net)
     turned = _Turned(net, file)
-    figure = Figure(figsize=(14, 6), layout="constrained")
+    figure = Figure(figsize=(14, 6))  # margins are given: to find them takes as long as to draw
+    figure.subplots_adjust(left=0.05, right=0.99, top=0.94, bottom=0.16, hspace=0.25)
     whole, close = figure.subplots(2, 1, height_ratios=(1, 1.4))
     for axes in (whole, close):
         _lanes(axes, net, file, turned)
@@ -67,7 +68,7 @@ def draw(folder: Path) -> Path:
     close.set_ylim(-MARGIN / 2, MARGIN / 2)
     close.set_xlabel("m past the gore, along the main road there")
     whole.set_title(f"{file.title}: {file.net}", fontsize="medium")
-    figure.legend(*close.get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=7)
+    figure.legend(*close.get_legend_handles_labels(), loc="lower center", fontsize="small", ncols=7)
     target = folder / PICTURE
     try:
         figure.savefig(target, dpi=110)

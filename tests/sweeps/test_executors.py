@@ -238,7 +238,7 @@ class Faulty(Estimator):
     )
     request = SweepRequest(["designed-random"], ["faulty"], settings=CASES, plugins=[plugin])
     with pytest.raises(UserError) as raised:
-        list(Processes(2, [plugin]).run(ChunkQueue(cut(plan(request), 60))))
+        list(Processes(1, [plugin]).run(ChunkQueue(cut(plan(request), 60))))
     fault = "line 11, in Faulty.update: return 1 / 0: ZeroDivisionError: division by zero"
     assert str(raised.value) == f"{plugin}, {fault}"
 
