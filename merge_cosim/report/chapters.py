@@ -104,7 +104,7 @@ def chapter(
     beliefs = measure_tables.belief_table(results, section)
     if beliefs is not None:
         found["belief"] = beliefs
-    own = set(rows["case"])
+    own = set(rows.loc[rows["case"].isin([one["case"] for one in recorded]), "case"])
     title = _title(scenario["title"], section.site, section.source)
     outcome = page_data.outcome_rows(tables.of_section(summary, section), rows, verdict)
     data = {

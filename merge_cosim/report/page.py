@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow.compute as pc
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.report import collisions, page_data, tables
@@ -20,12 +21,20 @@ from merge_cosim.report.published import FG_GMM_PAPER, PGM_PAPER
 from merge_cosim.report.trace_data import fitting, recorded_cases
 from merge_cosim.report.traffic_table import traffic_table
 from merge_cosim.results.notes import note_lines
+from merge_cosim.results.statistics.belief import COLUMNS as OF_BELIEF
 from merge_cosim.results.statistics.comparison import reference_of
-from merge_cosim.results.statistics.summary import GROUP, compare_all
+from merge_cosim.results.statistics.summary import COLUMNS, GROUP, compare_all
 from merge_cosim.results.statistics.verdict import verdicts
 from merge_cosim.results.store import MANIFEST, NOTES_CSV, ResultFolder
 
 REPORT = "report.html"
+READ = [
+    *("scenario", "variation", "site", "source", "case", "car", "method", "model", "world", "label"),
+    *("host_speed_0", "merging_speed_0", "ambiguity_s", "delay_s", "host_reached_s", "merging_reached_s", "end_s"),
+    *("failed", "failure_kind", "stuck", "censored", "extended", "smoothed_source", "host_reached", "sumo_collision"),
+]
+"""Columns of the rows that a report is made of. Those of `belief` are read only where a case has a label, those of the
+summary only where another comparison is asked for."""
 BRIEF_CASES = 3
 """Recorded cases of each chapter in a page that is shown in a notebook."""
 
@@ -36,7 +45,7 @@ class Report:
 
     Attributes:
         manifest: How the results were made.
-        results, summary: The rows of the folder; the summary with further columns for readers.
+        results, summary: The rows of the folder, with the columns `READ`; the summary with further columns for readers.
         traces, recorded: The recorded cases that the page has room for, as rows and for the viewer.
         left_out: Number of recorded cases without room.
         chapters: One for each scenario, site and source.
@@ -79,12 +88,13 @@ def read_report(folder: Path, against: str | None = None) -> Report:
         UserError: The folder holds no finished sweep, or not the method to compare with.
     """
     store = ResultFolder(folder)
-    results = store.results().to_pandas()
+    labelled = bool(pc.any(pc.not_equal(store.results(["label"])["label"], "")).as_py())
+    results = _frame(store, [*READ, *(OF_BELIEF if labelled else ())])
     if not len(results):
         raise UserError(f"{folder}: nothing to report: no car merged next to a host; see its {NOTES_CSV}")
     manifest = store.read_json(MANIFEST)
     labels = [f"{name}={value}" for name, values in manifest["variations"] for value in values]
-    summary = tables.summary_frame(_compared(store.summary(), results, against), labels)
+    summary = tables.summary_frame(_compared(store, against), labels)
     shown, left_out = fitting(store.traces.recorded())
     traces = store.traces.read(shown).to_pandas()
     recorded = recorded_cases(traces, results)
@@ -160,16 +170,23 @@ def report_page(report: Report, note_lines: Sequence[str] = (), brief: bool = Fa
     )
 
 
-def _compared(rows: list[dict[str, Any]], results: pd.DataFrame, against: str | None) -> list[dict[str, Any]]:
+def _frame(store: ResultFolder, columns: Sequence[str]) -> pd.DataFrame:
+    """Some columns of the rows; what pandas does not share with Arrow is freed column by column."""
+    return store.results(list(dict.fromkeys(columns))).to_pandas(split_blocks=True, self_destruct=True)
+
+
+def _compared(store: ResultFolder, against: str | None) -> list[dict[str, Any]]:
     """Summary rows with the comparison that the reader asks for in place of the sweep's."""
+    rows = store.summary()
     if against is None:
         return rows
+    results = _frame(store, COLUMNS)
     found = compare_all(results, reference_of(sorted(set(results["method"])), against))
     return [row | found[tuple(row[name] for name in GROUP)] for row in rows]
 
 
 def _provenance(manifest: dict[str, Any], results: pd.DataFrame) -> dict[str, str]:
-    simulated = tables.simulated(results)
+    simulated = tables.simulated(results[["method"]])
     methods, jobs = simulated["method"].nunique(), manifest["command"]["jobs"]
     moved = {"sumo": "in SUMO", "closed-form": "in the closed form, without SUMO"}
     counted = results.groupby(["scenario", "source", "site"])["case"].nunique().reset_index()

@@ -11,7 +11,7 @@ import pandas as pd
 from merge_cosim.report.failure_shares import failure_shares
 from merge_cosim.report.methods import Look, in_order
 from merge_cosim.results.statistics import belief, calibration
-from merge_cosim.results.statistics.rates import bootstrap_means
+from merge_cosim.results.statistics.rates import MOST_CLUSTERS, bootstrap_means
 from merge_cosim.results.statistics.summary import ALL_STARTS, AMBIGUITY_EDGES, is_sample
 from merge_cosim.results.statistics.verdict import Verdict
 from merge_cosim.scenarios.methods import is_reference
@@ -186,8 +186,11 @@ def number(value: Any, decimals: int = 4) -> float | None:
 def _delay_interval(rows: pd.DataFrame) -> tuple[float | None, float | None]:
     if not len(rows) or not is_sample(rows):
         return None, None
-    clusters = rows["car"] if bool((rows["car"] != "").all()) else rows["case"]
-    return bootstrap_means(rows[["delay_s"]], clusters)[0]
+    if bool((rows["car"] != "").all()):
+        return bootstrap_means(rows[["delay_s"]], rows["car"])[0]
+    case = rows["case"]  # sorted by it; where each is there once, there is nothing to sum up by case
+    once = len(case) > MOST_CLUSTERS and not case.eq(case.shift()).any()
+    return bootstrap_means(rows[["delay_s"]], None if once else case)[0]
 
 
 def _by_method(frame: pd.DataFrame) -> Iterable[tuple[str, pd.DataFrame]]:

@@ -63,7 +63,7 @@ class Section:
         chosen = (frame["scenario"] == self.scenario) & (frame["source"] == self.source) & (frame["variation"] == "")
         if self.site != ALL_SITES:
             chosen &= frame["site"] == self.site
-        return frame[chosen]
+        return frame if chosen.all() else frame[chosen]
 
 
 def summary_frame(rows: list[dict[str, Any]], variations: Sequence[str] = ()) -> pd.DataFrame:
@@ -106,7 +106,7 @@ def main_table(summary: pd.DataFrame, section: Section) -> Table:
 
 def strata_table(results: pd.DataFrame, section: Section) -> Table:
     """Failure rates by how ambiguous the start is, and without the cases that outlast their log."""
-    rows = section.of(results)
+    rows = section.of(results)[["method", "failed", "censored", "extended", "ambiguity_s"]]
     rows = rows[~rows["censored"]]
     columns, parts = [METHOD], {}
     for (low, high), (start, part) in zip(pairwise(AMBIGUITY_EDGES), by_start(rows), strict=True):

@@ -55,7 +55,8 @@ def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> list[dict[str
     """
     if traces.empty:
         return []
-    rows = results[results["variation"] == ""].drop_duplicates(
+    recorded = results["case"].isin(traces["case"].unique())
+    rows = results[recorded & (results["variation"] == "")].drop_duplicates(
         ["scenario", "case", "method"]
     )  # of several models the first
     rows = rows.set_index(["scenario", "case", "method"]).sort_index()
