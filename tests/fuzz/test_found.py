@@ -249,6 +249,16 @@ def test_a_net_whose_offset_is_not_two_numbers(tmp_path: Path, offset: str) -> N
     assert f"the netOffset of its location is '{offset}', not two numbers" in line
 
 
+def test_a_net_with_a_lane_of_no_width(tmp_path: Path) -> None:
+    net = (shipped("sumo_nets") / "us101" / "us101.net.xml").read_text()
+    (tmp_path / "my.net.xml").write_text(re.sub('(?<=id="weave_0")(.*)width="3.82"', r'\1width="-0.0"', net))
+    line = refused("ramp", "describe", "my.net.xml", cwd=tmp_path)
+    assert "my.net.xml: no ramp is written, since it would not pass ramp check: " in line
+    assert "lane weave_0" in line
+    line = refused("ramp", "new", "mine", "--from-net", "my.net.xml", cwd=tmp_path)
+    assert "my.net.xml: lane weave_0 is -0 m wide; mend its 'width'" in line
+
+
 def test_a_net_without_a_junction(tmp_path: Path) -> None:
     net = (shipped("sumo_nets") / "us101" / "us101.net.xml").read_text().splitlines()
     (tmp_path / "my.net.xml").write_text("\n".join(line for line in net if '<junction id="main_end"' not in line))

@@ -55,7 +55,7 @@ def describe_ramp(net_file: Path, link: str | None = None, speed_limit: float | 
     except OSError as error:
         raise UserError(f"{target}: cannot be written ({error.strerror})") from None
     try:
-        require_checked(folder, folder)
+        require_checked(folder, net_file)
     except UserError:
         target.unlink()
         raise

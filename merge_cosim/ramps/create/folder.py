@@ -76,8 +76,11 @@ def write_ramp(
         for file, text in files.items():
             (made / file).write_text(text, encoding="utf-8")
         copy_view(pattern, made)
-        build(made)
-        require_checked(made, folder, just_built=True)
+        try:
+            build(made)
+            require_checked(made, folder, just_built=True)
+        except UserError as error:
+            raise UserError(str(error).replace(str(made), str(folder))) from None
         draw(made)
         try:
             shutil.copytree(made, folder, dirs_exist_ok=True)
@@ -87,15 +90,14 @@ def write_ramp(
 
 
 def require_checked(folder: Path, named: Path, just_built: bool = False) -> None:
-    """Refuse a ramp that `check` finds a problem of; `named` is the folder in the error line.
+    """Refuse a ramp that `check` finds a problem of; `named` is the file or folder that the error line names.
 
     Raises:
         UserError: There is a problem; the line holds all of them.
     """
-    found = check(folder, just_built)
-    problems = [line.replace(f"{folder / FILE_NAME}: ", "").replace(str(folder), str(named)) for line in found]
+    problems = [line.replace(f"{folder / FILE_NAME}: ", "") for line in check(folder, just_built)]
     if problems:
-        raise UserError(f"{named}: not written, since it would not pass ramp check: {'; '.join(problems)}")
+        raise UserError(f"{named}: no ramp is written, since it would not pass ramp check: {'; '.join(problems)}")
 
 
 def document(root: str, comment: str, rows: list[str]) -> str:

@@ -59,6 +59,9 @@ def ramp_from_net(
         raise UserError(
             f"{origin.file}: no speed limit for '{road}': {limit:.2f} m/s is {stand_in}; give one with --speed-limit"
         )
+    for lane in (lane for road in layout.roads for lane in road.edge.getLanes()):
+        if lane.getWidth() <= 0.0:
+            raise UserError(f"{origin.file}: lane {lane.getID()} is {lane.getWidth():g} m wide; mend its 'width'")
     left = any(keeps_left(road.edge) for road in layout.roads)
     plain = PlainXml(net, path, layout, limit, raised=speed_limit is None)
     definition = _definition(folder.name, joint, path, layout, limit, origin, given=speed_limit is not None)
