@@ -66,9 +66,11 @@ class Rollout(ReactingDriver, Acc):
     beside the host is taken to wait until the host has passed. With `tolerated_risk=0` it is not, and an escape from
     the full bounds is never given up.
 
-    Once the merging car is in the lane the law of acc drives. Beliefs, margins and reaction are those of the estimator
-    `interactive`. Of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left
-    to `yield`, or to `wait` where the merging car is slower than `standing`.
+    Once the merging car is in the lane the law of acc drives. Beliefs, margins, reaction and the merging car's state
+    are those of the estimator `interactive`; where that finds a sensor to be noisy, the deviations of station and speed
+    are added to `spread` and `spread_rate`, and an escape must hold for states up to `escape_deviations` of them off.
+    Of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left to `yield`, or
+    to `wait` where the merging car is slower than `standing`.
 
     Attributes:
         behind_margin: Time behind the merging car's present arrival that the policy `behind` aims at [s].
@@ -92,6 +94,7 @@ class Rollout(ReactingDriver, Acc):
         follower_braking: Braking that a driver behind the host is sure to have [m/s^2].
         follower_reaction: Time after which it brakes [s].
         escape_grades: Steps in which the driver's bounds are narrowed to 0, until there is an escape.
+        escape_deviations: Standard deviations by which the merging car's station and speed may be off in an escape.
         last_overlap: Cost of an overlap where there is no escape [s].
         least_belief: Types with less belief are not rolled out.
         ignore_share: Belief in `ignore` where the estimator has log-odds only.
@@ -121,6 +124,7 @@ class Rollout(ReactingDriver, Acc):
     follower_braking: PositiveFloat = 3.0
     follower_reaction: NonNegativeFloat = 0.3
     escape_grades: Count = 8
+    escape_deviations: NonNegativeFloat = 2.0
     last_overlap: NonNegativeFloat = 1000.0
     least_belief: Share = 0.001
     ignore_share: Annotated[float, Field(ge=0, lt=1)] = 0.2
@@ -176,6 +180,7 @@ class Rollout(ReactingDriver, Acc):
             self.escape_braking,
             self.escape_acceleration,
             self.driver_d0 if self.tolerated_risk else -np.inf,
+            self.escape_deviations,
             self.follower_braking,
             self.follower_reaction,
             setting.speed_limit,
@@ -206,8 +211,12 @@ class Rollout(ReactingDriver, Acc):
         from merge_cosim.controllers.compiled.escapes import NONE, constrain
         from merge_cosim.controllers.compiled.rollouts import choose
 
+        deviation = np.zeros((2, len(target)))
+        if self._filter is not None:
+            seen, deviation = self._filter.observed(seen), self._filter.deviation[:2]
+            target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
         wanted = super().command(seen, log_odds, target)
-        state = np.stack([getattr(seen, name) for name in STATE])
+        state = np.stack([*(getattr(seen, name) for name in STATE), *deviation])
         self._plans = plans = ~seen.merging_in_lane
         self.last_belief = self._belief(seen, log_odds)
         traits, delays = self._traits, self._delays

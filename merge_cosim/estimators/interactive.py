@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -32,6 +32,13 @@ class Interactive(ReactingDriver, Estimator):
     levels whose probabilities follow from the sum of each level's evidence over the hypotheses: drivers, and sensors,
     differ in how rough they are.
 
+    Station, speed and acceleration are those of an observer: the reported ones, and their difference, as long as the
+    sensor is exact. `x_t - x_{t-1} - dt v_t` is 0 for exact reports and changes slowly for a speed that was smoothed.
+    Where it changes from cycle to cycle like white noise, the noise of station and speed is estimated
+    (`compiled.observer`), a Kalman filter with a randomly changing acceleration takes over, the filter over types
+    begins anew, and the acceleration's variance is added to `sigma^2`. The age of reports cannot be told from them; a
+    known one is `latency`.
+
     So a steady difference, which the noise explains, weighs little, and a sudden one much. A driver begins to act at
     the rate `1 / reaction_time`, and draws its type anew at `change_rate`.
     `P(N) = b(not_yield) + (b(ignore) + b(late)) [T_m < T_h] + b(accelerate) [T_m' < T_h]`, with `T_m'` the arrival at
@@ -50,6 +57,9 @@ class Interactive(ReactingDriver, Estimator):
             rest waits.
         min_margin, max_margin: The margins range between these [s].
         farthest_start: Longest way to the merging point at which `late` begins to accelerate [m].
+        exact: Changes of the reported motion's residual up to which a sensor is taken to be exact [m].
+        driver_jerk: Change of an acceleration in a cycle, one standard deviation, per length of the cycle [m/s^3].
+        latency: Known age of what the sensor reports [s]; the state is moved on by it at the present acceleration.
     """
 
     name: ClassVar[str] = "interactive"
@@ -70,9 +80,13 @@ class Interactive(ReactingDriver, Estimator):
     min_margin: NonNegativeFloat = 0.8
     max_margin: NonNegativeFloat = 2.0
     farthest_start: NonNegativeFloat = 50.0
+    exact: PositiveFloat = 0.01
+    driver_jerk: PositiveFloat = 2.0
+    latency: NonNegativeFloat = 0.0
 
     def start(self, count: int, setting: Setting) -> None:
         """Make room for the beliefs."""
+        from merge_cosim.estimators.compiled.observer import MEMORY, ObserverLaw
         from merge_cosim.estimators.compiled.type_filter import FilterLaw
 
         super().start(count, setting)
@@ -100,8 +114,11 @@ class Interactive(ReactingDriver, Estimator):
         self._expected = np.zeros((count, len(self._kinds)))
         self._off = np.zeros((count, 2, len(self._kinds)))
         self._roughness = np.zeros((count, self.roughness_levels))
-        self._last_speed = np.full(count, np.nan)
         self._age = np.zeros(count, dtype=np.int64)
+        self._observer_law = ObserverLaw(self.exact, self.driver_jerk * setting.dt, self.latency, setting.dt)
+        self._reports = np.zeros((count, MEMORY))
+        self._station, self._speed, self._acceleration = np.zeros((3, count))
+        self.deviation = np.zeros((3, count))
         self.beliefs = np.zeros((count, len(DRIVER_TYPES)))
         self.traits = np.zeros((count, len(DRIVER_TYPES)))
         self.unreacted = np.zeros(count)
@@ -110,23 +127,37 @@ class Interactive(ReactingDriver, Estimator):
 
     def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
         """Begin with the prior at `rows`; the driver has not reacted yet."""
+        self._reports[rows] = 0.0
+        self._begin(rows)
+
+    def _begin(self, rows: IntArray) -> None:
         self._weight[rows, 0] = self._prior
         self._weight[rows, 1] = 0.0
         self._roughness[rows] = 1.0 / self.roughness_levels
         self.evidence[rows] = 0.0
-        self._last_speed[rows] = np.nan
         self._age[rows] = 0
+
+    def observed(self, seen: Observation) -> Observation:
+        """What the observer takes the state to be after `update` with `seen`."""
+        return replace(seen, merging_station=self._station, merging_speed=self._speed)
 
     def update(self, seen: Observation) -> FloatArray:
         """Weigh the last cycle's acceleration under each type."""
+        from merge_cosim.estimators.compiled.observer import observe
         from merge_cosim.estimators.compiled.type_filter import update
 
         log_odds = np.empty(len(seen.merging_speed))
+        state = self._station, self._speed, self._acceleration, self.deviation
+        before = self._age.copy()
+        reports = seen.merging_station.copy(), seen.merging_speed.copy()
+        observe(*reports, self._observer_law, self._reports, *state, self._age)
+        if np.count_nonzero(found := before > self._age):
+            self._begin(np.flatnonzero(found))
         update(
             seen.host_station.copy(),  # numba compiles anew for arrays that are read-only, as those of a world are
             seen.host_speed.copy(),
-            seen.merging_station.copy(),
-            seen.merging_speed.copy(),
+            self._station,
+            self._speed,
             seen.host_length,
             self._kinds,
             self._traits,
@@ -137,7 +168,8 @@ class Interactive(ReactingDriver, Estimator):
             self._expected,
             self._off,
             self._roughness,
-            self._last_speed,
+            self._acceleration,
+            self.deviation[2],
             self._age,
             self.beliefs,
             self.traits,

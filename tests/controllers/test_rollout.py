@@ -25,7 +25,7 @@ from merge_cosim.estimators.interactive import Interactive
 from merge_cosim.simulation.host_driver import HostDriver
 
 LIMIT = 29.0
-BOUNDS = Bounds(-4.0, 2.0, 4.0, 3.0, -np.inf, 3.0, 0.3, LIMIT, 0.1, 200)
+BOUNDS = Bounds(-4.0, 2.0, 4.0, 3.0, -np.inf, 2.0, 3.0, 0.3, LIMIT, 0.1, 200)
 FULL = -4.0, 3.0, 0.0
 
 
@@ -39,9 +39,9 @@ def one(host, host_speed, merging, merging_speed):
     return Observation(*(np.array([float(v)]) for v in (host, host_speed, merging, merging_speed, 5, 5)))
 
 
-def column(*state):
+def column(*state, off=(0.0, 0.0)):
     """The state of one encounter as the planner hands it on: a column, for which the kernels are compiled anyway."""
-    return np.repeat([*state, 5.0, 5.0], 2).reshape(-1, 2)[:, 0]
+    return np.repeat([*state, 5.0, 5.0, *off], 2).reshape(-1, 2)[:, 0]
 
 
 def planner(n=1, **values):
@@ -177,6 +177,20 @@ def test_after_the_merge_the_law_of_acc_drives():
 )
 def test_escapes_by_hand(state, then, holds):
     assert escapes(then, then, column(*state), *FULL, TOLERANCE, BOUNDS) == holds
+
+
+@pytest.mark.parametrize(
+    ("state", "then", "off", "holds"),
+    [
+        ((5, 27, -2, 20), 2.0, (0.0, 0.0), True),  # its rear 2 m past the driver, who gains at most 2.4 m on it
+        ((5, 27, -2, 20), 2.0, (1.5, 0.0), False),  # the driver may be 3 m further on
+        ((-10, 20, -20, 20), 2.0, (0.0, 0.0), True),  # through before the driver comes, who can brake behind the host
+        ((-10, 20, -20, 20), 2.0, (0.0, 2.0), False),  # the driver may be 4 m/s faster
+        ((-60, 20, -60, 20), -4.0, (9.0, 9.0), True),  # a stop does not depend on the driver
+    ],
+)
+def test_an_escape_must_hold_for_states_two_deviations_off(state, then, off, holds):
+    assert escapes(then, then, column(*state, off=off), *FULL, TOLERANCE, BOUNDS) == holds
 
 
 @pytest.mark.parametrize(

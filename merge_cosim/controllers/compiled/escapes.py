@@ -27,6 +27,7 @@ class Bounds(NamedTuple):
     driver_braking: float
     driver_acceleration: float
     past: float
+    deviations: float
     follower_braking: float
     follower_reaction: float
     speed_limit: float
@@ -64,19 +65,20 @@ def escapes(
     driver who stands beside the host waits until the host has passed, so that the host may do anything. A stop counts
     that ends at least `stop` before the merging point.
     """
-    host_station, host_speed, station, speed, host_length, length = state
+    host_station, host_speed, station, speed, host_length, length = state[:6]
+    station_margin, speed_margin = bounds.deviations * state[6], bounds.deviations * state[7]
     if waits_beside(host_station, host_length, station, speed, bounds.past):
         return True
     dt = bounds.dt
-    top = max(bounds.speed_limit, speed)
-    slow_station, slow_speed = station, speed
-    fast_station, fast_speed = station, speed
+    top = max(bounds.speed_limit, speed + speed_margin)
+    slow_station, slow_speed = station - station_margin, max(speed - speed_margin, 0.0)
+    fast_station, fast_speed = station + station_margin, speed + speed_margin
     acceleration = first
     order = 0  # 1: the driver is behind, 2: ahead
     if host_station >= -SHORT:
-        if station < host_station - TOL:
+        if fast_station < host_station - TOL:
             order = 1
-        elif station >= -TOL:
+        elif slow_station >= -TOL:
             order = 2
     for _ in range(bounds.cycles):
         host_speed = min(max(host_speed + acceleration * dt, 0.0), max(bounds.speed_limit, host_speed))
@@ -161,7 +163,7 @@ def constrain(
     is an escape within them.
 
     Args:
-        state: The rows of an `Observation`, shape (6, n).
+        state: The rows of an `Observation`, and the deviations of the merging car's station and speed, shape (8, n).
         guarded: Encounters that are looked at, shape (n,).
         shares: Shares of the driver's bounds, falling, shape (grades,).
         centre: What the driver is expected to do [m/s^2], shape (n,).

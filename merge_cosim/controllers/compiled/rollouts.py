@@ -97,6 +97,8 @@ def rollout(
     station: float,
     speed: float,
     length: float,
+    spread: float,
+    spread_rate: float,
     last: float,
     enough: float,
     host: HostLaw,
@@ -157,7 +159,7 @@ def rollout(
         for _ in range(2):
             ahead = merging_at - host_at >= -TOL
             gap = merging_at - length - host_at if ahead else host_at - host_length - merging_at
-            surest = min(surest, gap / (host.spread + host.spread_rate * at))
+            surest = min(surest, gap / (spread + spread_rate * at))
             at, host_at, merging_at = time, host_station, station
         if gap < -TOL or both * host.step >= host.scored:
             break
@@ -185,7 +187,8 @@ def expected_cost(
     law: DriverLaw,
 ) -> tuple[float, float]:
     """Cost of a policy expected over the types of drivers, and probability of an overlap; see `rollout`."""
-    h, v, s, u, length_h, length_m = state[:, row]
+    h, v, s, u, length_h, length_m = state[:6, row]
+    spread, spread_rate = host.spread + state[6, row], host.spread_rate + state[7, row]
     expected, danger, left, likeliest = 0.0, 0.0, 0.0, 0
     for kind in range(belief.shape[1]):
         if belief[row, kind] >= least:
@@ -201,7 +204,23 @@ def expected_cost(
         left -= share
         most = (enough - expected - soon * left) / max(share, 1e-300)
         cost, overlaps = rollout(
-            policy, held, kind, traits[row, kind], delay, h, v, length_h, s, u, length_m, last, most, host, law
+            policy,
+            held,
+            kind,
+            traits[row, kind],
+            delay,
+            h,
+            v,
+            length_h,
+            s,
+            u,
+            length_m,
+            spread,
+            spread_rate,
+            last,
+            most,
+            host,
+            law,
         )
         expected += share * cost
         danger += share * overlaps
@@ -226,7 +245,7 @@ def cost_table(
 ) -> None:
     """Fill `costs`, shape (n, policies, types), with the cost of every policy against every type; see `choose`."""
     for row in range(state.shape[1]):
-        h, v, s, u, length_h, length_m = state[:, row]
+        h, v, s, u, length_h, length_m = state[:6, row]
         for policy in range(kinds.shape[0]):
             for kind in range(belief.shape[1]):
                 costs[row, policy, kind] = 0.0
@@ -243,6 +262,8 @@ def cost_table(
                         s,
                         u,
                         length_m,
+                        host.spread + state[6, row],
+                        host.spread_rate + state[7, row],
                         last[row],
                         np.inf,
                         host,
@@ -274,7 +295,7 @@ def choose(
     Policies are rolled out only until it is sure that they are not chosen.
 
     Args:
-        state: The rows of an `Observation`, shape (6, n).
+        state: The rows of an `Observation`, and the deviations of the merging car's station and speed, shape (8, n).
         plans: Encounters whose merging car is not yet in the lane, shape (n,).
         belief: Belief in each type of driver, shape (n, types); types with less than `least` are left out, at cost 0.
         traits: The driver's trait under each type, see `planned`, shape (n, types).
@@ -292,7 +313,7 @@ def choose(
         wanted: Acceleration that the chosen policy wants [m/s^2]; to be filled, shape (n,).
     """
     for row in range(state.shape[1]):
-        h, v, s, u, length_h, length_m = state[:, row]
+        h, v, s, u, length_h, length_m = state[:6, row]
         centre[row] = 0.0
         for kind in range(belief.shape[1]):
             if belief[row, kind] >= least:

@@ -38,7 +38,8 @@ def update(
     expected: FloatArray,
     off: FloatArray,
     roughness: FloatArray,
-    last_speed: FloatArray,
+    acceleration: FloatArray,
+    deviation: FloatArray,
     age: IntArray,
     beliefs: FloatArray,
     mean_traits: FloatArray,
@@ -50,8 +51,11 @@ def update(
     hypotheses, levels = kinds.shape[0], roughness.shape[1]
     evidence = np.zeros(levels)
     for row in range(station.shape[0]):
-        if not np.isnan(last_speed[row]):
-            acceleration = (speed[row] - last_speed[row]) / law.dt
+        if age[row] > 0:
+            variance = deviation[row] * deviation[row]
+            innovation = filter_law.innovation
+            if variance > 0.0:
+                innovation = sqrt(innovation**2 + variance * (1.0 - filter_law.keep**2))
             # what changes between the cycles
             for one in range(hypotheses):
                 moved = weight[row, 0, one] * filter_law.reacts
@@ -73,11 +77,11 @@ def update(
             for acts in range(2):
                 for one in range(hypotheses):
                     mean = expected[row, one] if acts == 1 else 0.0
-                    n = acceleration - mean
+                    n = acceleration[row] - mean
                     if age[row] == 1:
-                        e, s = n, sqrt(filter_law.sigma**2 + filter_law.innovation**2)
+                        e, s = n, sqrt(filter_law.sigma**2 + variance + innovation**2)
                     else:
-                        e, s = n - filter_law.keep * off[row, acts, one], filter_law.innovation
+                        e, s = n - filter_law.keep * off[row, acts, one], innovation
                     off[row, acts, one] = n
                     p = 0.0
                     for level in range(levels):
@@ -118,7 +122,6 @@ def update(
             expected[row, one] = max(planned, min(-speed[row] / law.dt, 0.0))
         for kind in range(beliefs.shape[1]):
             mean_traits[row, kind] /= max(beliefs[row, kind], 1e-300)
-        last_speed[row] = speed[row]
         age[row] += 1
         host_arrival = arrival(host_station[row], host_speed[row])
         not_yield = beliefs[row, NOT_YIELD]
