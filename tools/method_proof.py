@@ -100,6 +100,11 @@ STUDIES = {
     "shifted-seeds": Study(["shifted"], ["interactive", "slot-time", "ipcb"], [{"encounters.seed": 5}]),
     "replay": Study(["us101-replay"], [*RIVALS, "human"], logged=True),
     "sensing": Study(["designed-3"], ["interactive", *OTHERS], SENSING),
+    "latency": Study(
+        ["designed-3"],
+        ["interactive"],
+        [given | {"interactive.latency": given["sensing.delay"]} for given in SENSING if "sensing.delay" in given],
+    ),
     "planners": Study(["designed-3"], ["interactive", *PLANNERS, "oracle-label+rollout"]),
     "ablations": Study(["designed-3"], ["interactive"], ABLATIONS),
     "front": Study(["designed-3"], ["interactive"], FRONT),
