@@ -68,8 +68,8 @@ class Rollout(ReactingDriver, Acc):
 
     Once the merging car is in the lane the law of acc drives. Beliefs, margins, reaction and the merging car's state
     are those of the estimator `interactive`; where that finds a sensor to be noisy, the deviations of station and speed
-    are added to `spread` and `spread_rate`, and an escape must hold for states up to `escape_deviations` of them off.
-    Of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left to `yield`, or
+    are added to `spread` and `spread_rate`, and an escape must hold for states up to `escape_deviations` of them off, and
+    for a car that is further on by what it drives in the estimator's `unknown_age`. Of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left to `yield`, or
     to `wait` where the merging car is slower than `standing`.
 
     Attributes:
@@ -211,12 +211,12 @@ class Rollout(ReactingDriver, Acc):
         from merge_cosim.controllers.compiled.escapes import NONE, constrain
         from merge_cosim.controllers.compiled.rollouts import choose
 
-        deviation = np.zeros((2, len(target)))
+        deviation, late = np.zeros((2, len(target))), np.zeros(len(target))
         if self._filter is not None:
-            seen, deviation = self._filter.observed(seen), self._filter.deviation[:2]
+            seen, deviation, late = self._filter.observed(seen), self._filter.deviation[:2], self._filter.late
             target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
         wanted = super().command(seen, log_odds, target)
-        state = np.stack([*(getattr(seen, name) for name in STATE), *deviation])
+        state = np.stack([*(getattr(seen, name) for name in STATE), *deviation, late])
         self._plans = plans = ~seen.merging_in_lane
         self.last_belief = self._belief(seen, log_odds)
         traits, delays = self._traits, self._delays

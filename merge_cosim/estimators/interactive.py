@@ -60,6 +60,7 @@ class Interactive(ReactingDriver, Estimator):
         exact: Changes of the reported motion's residual up to which a sensor is taken to be exact [m].
         driver_jerk: Change of an acceleration in a cycle, one standard deviation, per length of the cycle [m/s^3].
         latency: Known age of what the sensor reports [s]; the state is moved on by it at the present acceleration.
+        unknown_age: Age that reports of a sensor that is not exact may have besides [s], which escapes allow for.
     """
 
     name: ClassVar[str] = "interactive"
@@ -83,6 +84,7 @@ class Interactive(ReactingDriver, Estimator):
     exact: PositiveFloat = 0.01
     driver_jerk: PositiveFloat = 2.0
     latency: NonNegativeFloat = 0.0
+    unknown_age: NonNegativeFloat = 0.2
 
     def start(self, count: int, setting: Setting) -> None:
         """Make room for the beliefs."""
@@ -115,10 +117,11 @@ class Interactive(ReactingDriver, Estimator):
         self._off = np.zeros((count, 2, len(self._kinds)))
         self._roughness = np.zeros((count, self.roughness_levels))
         self._age = np.zeros(count, dtype=np.int64)
-        self._observer_law = ObserverLaw(self.exact, self.driver_jerk * setting.dt, self.latency, setting.dt)
+        ages = self.latency, self.unknown_age
+        self._observer_law = ObserverLaw(self.exact, self.driver_jerk * setting.dt, *ages, setting.dt)
         self._reports = np.zeros((count, MEMORY))
         self._station, self._speed, self._acceleration = np.zeros((3, count))
-        self.deviation = np.zeros((3, count))
+        self.deviation, self.late = np.zeros((3, count)), np.zeros(count)
         self.beliefs = np.zeros((count, len(DRIVER_TYPES)))
         self.traits = np.zeros((count, len(DRIVER_TYPES)))
         self.unreacted = np.zeros(count)
@@ -147,7 +150,7 @@ class Interactive(ReactingDriver, Estimator):
         from merge_cosim.estimators.compiled.type_filter import update
 
         log_odds = np.empty(len(seen.merging_speed))
-        state = self._station, self._speed, self._acceleration, self.deviation
+        state = self._station, self._speed, self._acceleration, self.deviation, self.late
         before = self._age.copy()
         reports = seen.merging_station.copy(), seen.merging_speed.copy()
         observe(*reports, self._observer_law, self._reports, *state, self._age)

@@ -39,7 +39,7 @@ def one(host, host_speed, merging, merging_speed):
     return Observation(*(np.array([float(v)]) for v in (host, host_speed, merging, merging_speed, 5, 5)))
 
 
-def column(*state, off=(0.0, 0.0)):
+def column(*state, off=(0.0, 0.0, 0.0)):
     """The state of one encounter as the planner hands it on: a column, for which the kernels are compiled anyway."""
     return np.repeat([*state, 5.0, 5.0, *off], 2).reshape(-1, 2)[:, 0]
 
@@ -182,11 +182,12 @@ def test_escapes_by_hand(state, then, holds):
 @pytest.mark.parametrize(
     ("state", "then", "off", "holds"),
     [
-        ((5, 27, -2, 20), 2.0, (0.0, 0.0), True),  # its rear 2 m past the driver, who gains at most 2.4 m on it
-        ((5, 27, -2, 20), 2.0, (1.5, 0.0), False),  # the driver may be 3 m further on
-        ((-10, 20, -20, 20), 2.0, (0.0, 0.0), True),  # through before the driver comes, who can brake behind the host
-        ((-10, 20, -20, 20), 2.0, (0.0, 2.0), False),  # the driver may be 4 m/s faster
-        ((-60, 20, -60, 20), -4.0, (9.0, 9.0), True),  # a stop does not depend on the driver
+        ((5, 27, -2, 20), 2.0, (0.0, 0.0, 0.0), True),  # its rear 2 m past the driver, who gains at most 2.4 m on it
+        ((5, 27, -2, 20), 2.0, (1.5, 0.0, 0.0), False),  # the driver may be 3 m further on
+        ((5, 27, -2, 20), 2.0, (0.0, 0.0, 3.0), False),  # the same, for reports are old
+        ((-10, 20, -20, 20), 2.0, (0.0, 0.0, 0.0), True),  # through before the driver comes, who can brake behind the host
+        ((-10, 20, -20, 20), 2.0, (0.0, 2.0, 0.0), False),  # the driver may be 4 m/s faster
+        ((-60, 20, -60, 20), -4.0, (9.0, 9.0, 0.0), True),  # a stop does not depend on the driver
     ],
 )
 def test_an_escape_must_hold_for_states_two_deviations_off(state, then, off, holds):

@@ -21,9 +21,9 @@ DT = 0.1
 def observed(station, speed, **law):
     """Stations, speeds, accelerations, deviations and memory of one car over all cycles."""
     memory, age = np.zeros((1, MEMORY)), np.ones(1, np.int64)
-    state = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((3, 1))
+    state = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((3, 1)), np.zeros(1)
     rows, deviations = [], []
-    fixed = ObserverLaw(**{"exact": 0.01, "change": 0.2, "latency": 0.0, "dt": DT} | law)
+    fixed = ObserverLaw(**{"exact": 0.01, "change": 0.2, "latency": 0.0, "unknown": 0.2, "dt": DT} | law)
     for x, v in zip(station, speed, strict=True):
         observe(np.array([x]), np.array([v]), fixed, memory, *state, age)
         rows.append([one[0] for one in state[:3]])

@@ -72,7 +72,7 @@ def escapes(
     dt = bounds.dt
     top = max(bounds.speed_limit, speed + speed_margin)
     slow_station, slow_speed = station - station_margin, max(speed - speed_margin, 0.0)
-    fast_station, fast_speed = station + station_margin, speed + speed_margin
+    fast_station, fast_speed = station + station_margin + state[8], speed + speed_margin
     acceleration = first
     order = 0  # 1: the driver is behind, 2: ahead
     if host_station >= -SHORT:
@@ -163,7 +163,8 @@ def constrain(
     is an escape within them.
 
     Args:
-        state: The rows of an `Observation`, and the deviations of the merging car's station and speed, shape (8, n).
+        state: The rows of an `Observation`, the deviations of the merging car's station and speed, and how much further
+            on it may be [m], shape (9, n).
         guarded: Encounters that are looked at, shape (n,).
         shares: Shares of the driver's bounds, falling, shape (grades,).
         centre: What the driver is expected to do [m/s^2], shape (n,).

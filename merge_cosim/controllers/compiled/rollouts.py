@@ -295,7 +295,8 @@ def choose(
     Policies are rolled out only until it is sure that they are not chosen.
 
     Args:
-        state: The rows of an `Observation`, and the deviations of the merging car's station and speed, shape (8, n).
+        state: The rows of an `Observation`, the deviations of the merging car's station and speed, and how much further
+            on it may be [m], shape (9, n).
         plans: Encounters whose merging car is not yet in the lane, shape (n,).
         belief: Belief in each type of driver, shape (n, types); types with less than `least` are left out, at cost 0.
         traits: The driver's trait under each type, see `planned`, shape (n, types).

@@ -33,6 +33,7 @@ class ObserverLaw(NamedTuple):
     exact: float
     change: float
     latency: float
+    unknown: float
     dt: float
 
 
@@ -93,6 +94,7 @@ def observe(
     seen_speed: FloatArray,
     acceleration: FloatArray,
     deviation: FloatArray,
+    late: FloatArray,
     age: IntArray,
 ) -> None:
     """One cycle of all encounters; without noise the state is what was reported, bit for bit.
@@ -106,6 +108,7 @@ def observe(
         seen_speed: To be filled with its speed [m/s], shape (n,).
         acceleration: To be filled with its acceleration [m/s^2], NaN in the first cycle, shape (n,).
         deviation: To be filled with the standard deviations of the three, shape (3, n).
+        late: To be filled with the way [m] that the car may be further on, for reports may be old, shape (n,).
         age: Set to 0 where noise is found: what was concluded from accelerations before means nothing; shape (n,).
     """
     dt = law.dt
@@ -114,6 +117,7 @@ def observe(
         x, v = station[row], speed[row]
         seen_station[row], seen_speed[row] = x, v
         acceleration[row] = np.nan
+        late[row] = 0.0
         for part in range(3):
             deviation[part, row] = 0.0
         if own[CYCLES] > 0:
@@ -153,6 +157,7 @@ def observe(
             deviation[0, row] = sqrt(max(own[COVARIANCE], 0.0))
             deviation[1, row] = sqrt(max(own[COVARIANCE + 3], 0.0))
             deviation[2, row] = sqrt(max(own[COVARIANCE + 5], 0.0))
+            late[row] = law.unknown * seen_speed[row]
         if law.latency > 0.0:  # the same acceleration ever since
             v = seen_speed[row]
             gained = 0.0 if np.isnan(acceleration[row]) else law.latency * min(max(acceleration[row], -MOST), MOST)
