@@ -68,9 +68,10 @@ class Rollout(ReactingDriver, Acc):
 
     Once the merging car is in the lane the law of acc drives. Beliefs, margins, reaction and the merging car's state
     are those of the estimator `interactive`; where that finds a sensor to be noisy, the deviations of station and speed
-    are added to `spread` and `spread_rate`, and an escape must hold for states up to `escape_deviations` of them off, and
-    for a car that is further on by what it drives in the estimator's `unknown_age`. Of another's `P(N)`, `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left to `yield`, or
-    to `wait` where the merging car is slower than `standing`.
+    are added to `spread` and `spread_rate`, and an escape must hold for states up to `escape_deviations` of them off,
+    and for a car that is further on by what it drives in the estimator's `unknown_age`. Of another's `P(N)`,
+    `ignore_share` goes to `ignore`, `P(N)` of the rest to `not_yield`, what is left to `yield`, or to `wait` where the
+    merging car is slower than `standing`.
 
     Attributes:
         behind_margin: Time behind the merging car's present arrival that the policy `behind` aims at [s].

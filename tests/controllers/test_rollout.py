@@ -185,7 +185,7 @@ def test_escapes_by_hand(state, then, holds):
         ((5, 27, -2, 20), 2.0, (0.0, 0.0, 0.0), True),  # its rear 2 m past the driver, who gains at most 2.4 m on it
         ((5, 27, -2, 20), 2.0, (1.5, 0.0, 0.0), False),  # the driver may be 3 m further on
         ((5, 27, -2, 20), 2.0, (0.0, 0.0, 3.0), False),  # the same, for reports are old
-        ((-10, 20, -20, 20), 2.0, (0.0, 0.0, 0.0), True),  # through before the driver comes, who can brake behind the host
+        ((-10, 20, -20, 20), 2.0, (0.0, 0.0, 0.0), True),  # through first, and the driver can brake
         ((-10, 20, -20, 20), 2.0, (0.0, 2.0, 0.0), False),  # the driver may be 4 m/s faster
         ((-60, 20, -60, 20), -4.0, (9.0, 9.0, 0.0), True),  # a stop does not depend on the driver
     ],
