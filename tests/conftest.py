@@ -82,9 +82,8 @@ def short_surrogate() -> None:
         RECIPES[name] = replace(recipe, seeds=recipe.seeds[:1], duration=300.0)
 
 
-@pytest.fixture(autouse=True)
 def own_registries() -> Iterator[None]:
-    """What a test registers is gone after it: another may use the name, or list all methods."""
+    """What a test, or what its module shares, registers is gone afterwards: others may use the name, or list all."""
     from merge_cosim.controllers.base import controllers
     from merge_cosim.estimators.base import estimators
     from merge_cosim.merging_cars.base import merging_cars
@@ -95,3 +94,7 @@ def own_registries() -> Iterator[None]:
             registry.names()  # ours are registered from now on
             stack.enter_context(patch.dict(registry._classes))
         yield
+
+
+registries_of_module = pytest.fixture(scope="module", autouse=True, name="registries_of_module")(own_registries)
+registries_of_test = pytest.fixture(autouse=True, name="registries_of_test")(own_registries)
