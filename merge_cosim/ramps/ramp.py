@@ -248,7 +248,7 @@ def parsed_net(path: Path, named: Path) -> sumolib.net.Net:
     """Parse a net; `named` is the file in error lines.
 
     Raises:
-        UserError: It cannot be parsed, or lacks a junction that an edge names, or its offset is not two numbers.
+        UserError: It cannot be parsed, an edge has no junction that is there, or its offset is not two numbers.
     """
     try:
         net = sumolib.net.readNet(str(path))
@@ -257,6 +257,9 @@ def parsed_net(path: Path, named: Path) -> sumolib.net.Net:
     for node in net.getNodes():
         if node.getCoord3D() is None:
             raise UserError(f"{named}: not a whole SUMO net: it has no junction '{node.getID()}', which an edge names")
+    for edge in net.getEdges():
+        if edge.getFromNode() is None or edge.getToNode() is None:
+            raise UserError(f"{named}: not a SUMO net: edge '{edge.getID()}' is not internal, but names no junctions")
     offset = net._location.get("netOffset", "0,0")
     try:
         east, north = map(float, offset.split(","))

@@ -130,7 +130,8 @@ def test_a_variation_without_an_end_or_backwards(written: str) -> None:
         ('length="500.00" width', 'length="inf" width'),
         (
             '<edge id="main_in"',
-            '<edge id="main_in"><lane id="main_in_0" index="0" speed="1" length="2" shape="0,0 1,0"/></edge>'
+            '<edge id="main_in" from="main_start" to="gore">'
+            '<lane id="main_in_0" index="0" speed="1" length="2" shape="0,0 1,0"/></edge>'
             '<edge id="main_in"',
         ),
     ],
@@ -264,6 +265,13 @@ def test_a_net_without_a_junction(tmp_path: Path) -> None:
     (tmp_path / "my.net.xml").write_text("\n".join(line for line in net if '<junction id="main_end"' not in line))
     line = refused("ramp", "describe", "my.net.xml", cwd=tmp_path)
     assert "my.net.xml: not a whole SUMO net: it has no junction 'main_end', which an edge names" in line
+
+
+def test_an_edge_without_junctions(tmp_path: Path) -> None:
+    net = (shipped("sumo_nets") / "us101" / "us101.net.xml").read_text()
+    (tmp_path / "my.net.xml").write_text(net.replace('id=":lane_end_1" function="internal"', 'id=":lane_end_1"'))
+    line = refused("ramp", "describe", "my.net.xml", cwd=tmp_path)
+    assert "my.net.xml: not a SUMO net: edge ':lane_end_1' is not internal, but names no junctions" in line
 
 
 def test_a_car_too_fast_to_be_one(tmp_path: Path) -> None:
