@@ -165,7 +165,10 @@ def proof(name: str, short: bool, data: Path | None, again: Sequence[str] = ()) 
     if not any(row[2] for row in rows):
         head, rows = head[:2] + head[3:], [row[:2] + row[3:] for row in rows]
     if again:
-        rows = sorted(rows + stays(name, head, again), key=lambda row: row[: len(head) - 8])
+        order = [shown(settings) for settings in study.settings]
+        at = head.index("settings") if "settings" in head else None
+        rows += stays(name, head, again)
+        rows.sort(key=lambda row: (0 if at is None else order.index(row[at]), *row[: len(head) - 8]))
     return f"`{study.command(study.settings[0])}`\n\n{table(head, rows, left=len(head) - 8)}"
 
 
