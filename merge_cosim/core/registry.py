@@ -268,7 +268,14 @@ def validated(cls: type[C], values: Mapping[str, Any], where: str) -> C:
 
 @cache
 def _adapter(cls: type[C]) -> TypeAdapter[C]:
-    return TypeAdapter(cls)
+    try:
+        adapter = TypeAdapter(cls)
+        adapter.rebuild()  # raises where a hint names what is not there; nothing is done otherwise
+        return adapter
+    except Exception as error:  # a type hint may be anything, and pydantic may raise anything at it
+        file = getattr(sys.modules.get(cls.__module__), "__file__", None) or cls.__module__
+        reason = str(error).partition("\n")[0]
+        raise UserError(f"{file}: class {cls.__name__}: a type hint cannot be used ({reason})") from None
 
 
 def load_plugin(file: Path) -> None:

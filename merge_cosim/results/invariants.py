@@ -53,6 +53,15 @@ def joined(parts: Iterable[Checked]) -> dict[str, Any]:
     return total
 
 
+def is_checked(found: object) -> bool:
+    """Whether what was read from a file has the form of `Checked`, with a first case of every broken invariant."""
+    match found:
+        case {"encounters": int(), "broken": {**broken}, "first": {**first}}:
+            counts = all(isinstance(count, int) for count in broken.values())
+            return counts and {name for name, count in broken.items() if count} <= INVARIANTS.keys() & first.keys()
+    return False
+
+
 def lines(found: Checked) -> list[str]:
     """A line for each invariant that was broken."""
     return [

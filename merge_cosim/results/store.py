@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.files import refuse_file
 from merge_cosim.results.files import csv_rows, csv_table, read_json, readable, write_text
-from merge_cosim.results.invariants import joined
+from merge_cosim.results.invariants import is_checked, joined
 from merge_cosim.results.merged_rows import Rows
 from merge_cosim.results.parts import BEFORE, Parts, with_facts
 from merge_cosim.results.schema import KEY, SCHEMA
@@ -126,8 +126,15 @@ class ResultFolder:
         self.rows.write(_completed(rows, more) for rows in self.parts.stretches())
 
     def invariants(self) -> dict[str, Any]:
-        """What the invariants of a finished sweep came to."""
+        """What the invariants of a finished sweep came to.
+
+        Raises:
+            UserError: The manifest is damaged.
+        """
         found: dict[str, Any] = self.read_json(MANIFEST).get("invariants") or joined(())
+        with readable(self.path / MANIFEST):
+            if not is_checked(found):
+                raise ValueError("invariants: no counts with a first case each")
         return found
 
     def summary(self) -> list[dict[str, Any]]:

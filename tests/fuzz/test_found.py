@@ -223,6 +223,23 @@ def test_a_result_folder_with_one_other_byte(tmp_path: Path) -> None:
             note_lines(folder)
 
 
+@pytest.mark.parametrize("hint", ["{}", "'nothing.here'"])
+def test_a_type_hint_that_is_none(tmp_path: Path, hint: str) -> None:
+    (tmp_path / "p.py").write_text(PLUGIN.replace("bias: float", f"bias: {hint}"))
+    line = refused("sweep", "designed-2", "--plugin", "p.py", "--method", "mine", "--out", "out", cwd=tmp_path)
+    assert "p.py: class Mine: a type hint cannot be used (" in line
+
+
+@pytest.mark.parametrize(
+    ("broken", "first"), [({"0x1": 1}, {"contact": "c"}), ({"contact": 1}, {}), ({"contact": "1"}, {"contact": "c"})]
+)
+def test_invariants_that_are_none(tmp_path: Path, broken: dict[str, object], first: dict[str, str]) -> None:
+    found = {"invariants": {"encounters": 3, "broken": broken, "first": first}}
+    (tmp_path / "manifest.json").write_text(json.dumps(found))
+    with pytest.raises(UserError, match=r"manifest\.json: damaged \(invariants: no counts with a first case each\)"):
+        ResultFolder(tmp_path).invariants()
+
+
 def test_a_condition_with_a_part_of_constants(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(GRID)
     words = ("--method", "acc", "--world", "closed-form", "--jobs", 1, "--out", "out")
