@@ -1,4 +1,7 @@
-"""Judge the drawn ramps by logged positions: python tools/geometry_page.py --data DIR writes docs/geometry.md."""
+"""Judge the drawn ramps by logged positions: python tools/geometry_page.py --data DIR fills docs/geometry.md.
+
+The page is written by hand but for its blocks `<!-- site: NAME -->` ... `<!-- end -->`.
+"""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -9,7 +12,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from blocks import page_parser, table
+from blocks import fill_page, page_parser, table
 from geometry.lines import SURVEY_FOOT, FloatArray, Line, read_lines
 from geometry.plan import Plan
 from geometry.positions import positions
@@ -117,6 +120,7 @@ def draw(ramp: Ramp, plan: Plan, cars: pd.DataFrame, target: Path) -> None:
     present = sorted(set(cars["Lane_ID"]))
     marks = [plt.Line2D([], [], marker="o", linestyle="", color=plt.get_cmap("tab10")(n - 1)) for n in present]
     panels[1].legend(marks, [f"lane {n}" for n in present], ncols=len(present), frameon=False, loc="lower right")
+    target.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(target, dpi=80)
     plt.close(figure)
 
@@ -139,7 +143,6 @@ def section(name: str, data: Path, docs: Path) -> str:
     beside = plan.edges[1]
     widths = ", ".join(f"{width:.2f}" for _, width in reversed(beside.lanes))
     parts = [
-        f"## {TITLES[name]}",
         f"Lane widths beside the auxiliary lane, from the left: {widths} m. {ties(name, ramp, plan)}",
         f"![Lanes of {TITLES[name]} with logged positions](img/geometry-{name}.png)",
         "Distance of logged positions from our lane's centre [m]. 'Odd' are the cars that were not used in any fit; "
@@ -155,7 +158,7 @@ def section(name: str, data: Path, docs: Path) -> str:
             "and 8 fit best to the drawn line, with a free lateral shift:",
             along_road(plan, drawn[DRAWN[name][6]], cars),
         ]
-    return "\n\n".join(parts)
+    return "\n\n".join(parts) + "\n"
 
 
 def corrections(plan: Plan) -> str:
@@ -171,84 +174,16 @@ def corrections(plan: Plan) -> str:
     return f"Correction of the drawn line by the cars of even number: {'; '.join(shifts)}."
 
 
-HEAD = """\
-# The geometry of US-101 and I-80
-
-Both nets are true to scale and georeferenced: lane counts and widths, the curve of the road, on-ramp, off-ramp,
-gore, auxiliary lane (US-101) and acceleration lane (I-80). In the median logged cars are a few decimetres from the
-centre of their lane in the net ([US-101](#us-101), [I-80](#i-80)); where it is worse, and why, is under
-[weaknesses](#weaknesses). The plain XML in `sumo_nets/` is written by
-
-    python tools/ramp_geometry.py --data DIR  # DIR/geometry/ and NGSIM's trajectories; writes and builds both
-    python tools/geometry_page.py --data DIR  # this page
-
-To build a net again (`merge-cosim ramp build us101`) no survey file is needed. `merge-cosim ramp edit us101` opens it
-in netedit; `view.xml` in each folder colours the lanes by their role.
-
-## Sources
-
-- Lane centre lines and road boundaries: NGSIM.jl (MIT), traced from NGSIM's CAD drawings, in feet of the California
-  state plane, NAD83 (US-101: zone V, EPSG:2229; I-80: zone III, EPSG:2227).
-- Trajectories: the fragments of NGSIM that the data folder holds; of I-80 single cars, which is enough for
-  the geometry.
-- One place in both coordinates: the first two rows of NGSIM's own files `trajectories-0750am-0805am.txt` (US-101)
-  and `trajectories-0400-0415.txt` (I-80), as many tutorials print them: Local_X, Local_Y with Global_X, Global_Y.
-
-## How the drawing becomes a net
-
-- **Plane.** Feet are US survey feet (1200/3937 m). The nets are in metres of EPSG:26945 (zone V) and EPSG:26943
-  (zone III), shifted so that (0, 0) is the host lane's axis at the gore; `<location>` says by how much, so that
-  netedit and sumo-gui can lay a map behind the net.
-- **Main road.** One axis: the mean of the drawn centre lines, each shifted by its lane's position across the road,
-  averaged over 30 m, because the tracing varies by about 0.15 m. Lane widths are the mean distances of the painted
-  boundaries. Corners that change the shape by less than 2 cm are left out.
-- **Along the road.** x = Local_Y - Local_Y of the gore is arc length along that axis, with the offset that the
-  published rows give. SUMO's edge lengths are set to it, so every station is exact.
-- **Across the road.** Local_X is distance across that axis. Its zero is set by the cars of even number, so that the
-  lanes with a drawn centre line (1 to 6 of US-101, 1 to 5 of I-80) have no common shift, in the mean over lanes of
-  each lane's median.
-- **US-101's ramps.** Lanes 7 and 8 have no centre line of their own; the auxiliary lane's runs on into both. It is
-  followed, corrected by a parabola that is fitted to the cars of even number, is zero at the auxiliary lane and
-  fades out over 40 m where no car was seen. Upstream the on-ramp follows the outer edge of its loop, half a lane
-  width inside; downstream the off-ramp follows its left edge.
-- **I-80's acceleration lane** keeps to the right edge of the road and so runs slantwise into lane 6: the two
-  overlap. The sixth lane has no right edge of its own in the drawing; it is as wide as the fifth.
-- **Beyond the survey** every road goes straight on; `[extensions]` in `ramp.toml` says where.
-"""
-
-TAIL = """\
-## Weaknesses
-
-- The alignment along the road rests on two published rows at the upstream end; an error in NGSIM's scale would show
-  at the other end. The lateral positions of all lanes together vary by up to a metre along the road, an error
-  of NGSIM's cameras. That, and how people drive, is most of the residual.
-- **Lane 6 of US-101**: merging cars keep to the left of it. They are part of the mean that sets Local_X, so lanes 1 to
-  5 are left with a small shift the other way. That lane 6 is part of this mean was decided after the alternative had
-  been seen: with lanes 1 to 5 only, its median is 0.63 m. The column 'rows only' does not depend on this.
-- Around Local_Y 1,390 to 1,410 ft of US-101 the positions of all lanes jump sideways and back by metres, probably
-  where the images of two cameras meet.
-- **Lane 8 of US-101**: few cars over 20 m of road; beyond Local_Y 1,380 ft, at that place, its positions are
-  left out.
-- **Lane 6 of I-80**: on-ramp cars count for it from Local_Y 667 ft on, wherever they are across the road; they make
-  its large distances.
-- **Lane 7 of I-80**: the source begins each car where it comes within 81.6 ft of the road's left edge, so the right
-  half of the on-ramp is seen too seldom.
-- The road behind I-80's survey keeps six lanes; the real one loses its sixth to the next off-ramp, 505 m past the
-  gore.
-- The speed limit is the same on the loop of US-101's on-ramp as on the freeway: no car could drive it that fast.
-- The road is flat: heights are left out.
-"""
-
-
 def main(argv: Sequence[str] | None = None) -> None:
-    """Write the page."""
+    """Fill the blocks."""
     parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with geometry/ and NGSIM's trajectories")
     given = parser.parse_args(argv)
-    (given.docs / "img").mkdir(parents=True, exist_ok=True)
-    names = list(TITLES)[-1:] if given.short else TITLES
-    parts = [HEAD.strip(), *(section(name, given.data, given.docs) for name in names), TAIL.strip()]
-    (given.docs / "geometry.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+    def site(name: str) -> str | None:
+        return None if given.short and name == "us101" else section(name, given.data, given.docs)
+
+    fill_page("geometry.md", given.docs, {"site": site})
 
 
 if __name__ == "__main__":

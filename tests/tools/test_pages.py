@@ -27,6 +27,8 @@ from PIL import Image
 from merge_cosim.report import figures
 
 DOCS = Path(__file__).parents[2] / "docs"
+ELSEWHERE = ("img/full-scene.png", "img/headroom-", "img/geometry-us101.png", "img/surrogate-i80.png")
+"""A screenshot, pictures of another tool, and pictures of sites that the short mode leaves out."""
 
 
 def headings(page: Path) -> list[str]:
@@ -40,8 +42,7 @@ def made_like(docs: Path, name: str) -> str:
     assert "| nan" not in text
     for link in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         target = docs / Path(name).parent / link
-        # made elsewhere: a screenshot, and the pictures of another tool
-        assert target.is_file() or link == "img/full-scene.png" or link.startswith("img/headroom-")
+        assert target.is_file() or link.startswith(ELSEWHERE)
     return text
 
 
