@@ -1,4 +1,4 @@
-"""Write docs/models.md: what the project's models were trained on, and how accurate they are.
+"""Fill the blocks of docs/models.md: what the project's models were trained on, and how accurate they are.
 
     python tools/models_page.py --data DIR
 
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from blocks import page_parser
+from blocks import fill_page, page_parser
 from blocks import table as markdown
 
 from merge_cosim.core.encounter import Encounters, Intention
@@ -29,24 +29,9 @@ from merge_cosim.studies.training import train, train_ensemble
 from merge_cosim.sweeps.sweep import SweepRequest, sweep
 
 SPEAKS_FOR = {"YIELD": Intention.YIELD, "NOT_YIELD": Intention.NOT_YIELD}
-HEAD = """\
-# The models
-
-What the learned estimators (`pgm`, `fg` and their variants) take from data: transitions of the merging car's speed, the
-two times to arrival, and the share of drivers that yield, separately for the merging cars that yield and those that do
-not. A model is one readable JSON file of counts in `merge_cosim/estimators/learned/models/`, with the keys of the
-merging cars it was trained on; a sweep refuses to test it on these. A sweep takes the model of its data: `us101-ngsim`
-on real data, `us101-surrogate` on surrogate data, `us101-ngsim-all` where no real pair is tested; `--model FILE` takes
-another.
-
-Made by `python tools/models_page.py --data DIR` with the NGSIM files in `DIR`. It trains every model again; {same}.
-"""
-HELD_OUT = """\
-The models are judged on the other merging cars. Both cars drive as logged; every 0.1 s counts until one of them reaches
-the merging point. In brackets the log loss, where the estimator gives probabilities (a guess of 50 % has 0.693)."""
-TAIL = """\
-## How to read it
-
+SAME = """\
+Made by `python tools/models_page.py --data DIR` with the NGSIM files in `DIR`. It trains every model again; {same}."""
+READING = """\
 - **Near the merging point the times to arrival determine the order**: all estimators that use them are right.
   Estimators can differ only further away.
 - **Against a rule that learns nothing** (`slot-time`: the car with the shorter time to arrival goes first), more
@@ -57,26 +42,13 @@ TAIL = """\
   length. The reason is how the pairs are made, not the number of cars.
 - **{frames} frames of real data are not as many independent observations**: those of one car are nearly alike. With
   {cars} cars, differences of a few per cent between estimators remain undecided.
-- Both cars drive as logged. A host that acts on the estimates gets into other situations than these.
-"""
+- Both cars drive as logged. A host that acts on the estimates gets into other situations than these."""
 REAL = {"ngsim": "real data", "surrogate": "surrogate"}
 LEARNED = (
     *("pgm", "pgm-symmetric", "pgm-time", "pgm-speed", "pgm-g"),
     *("fg", "fg-time", "fg-gmm", "fg-gmm-time", "dbn-pf", "ipcb"),
 )
 """Methods that learn from data."""
-SPREAD = """\
-## How much depends on which cars trained a model
-
-Median over models and, in brackets, the range over models. First Designed Test II under {splits} models, each trained
-on another third of the real cars (`train --splits {splits}`), then all real pairs of US-101 under {folds} models, each
-pair tested by the one model that was not trained on its car (`train --folds {folds}`, `sweep us101-replay --set
-encounters.sites={{us101='all'}} --model FOLDER`). Cars are moved by the closed form. A difference between two methods
-that is smaller than these ranges is a difference between training cars.
-
-{designed}
-
-{replay}"""
 RULE = "slot-time"
 """The rule that the learned estimators are held against."""
 
@@ -161,10 +133,10 @@ def judged(model: IntentionModel, report: dict[str, Any]) -> str:
 {table(report["held_out"])}"""
 
 
-def spread(data: Path, short: bool) -> str:
-    """How much of each method's result hangs on the cars that trained it."""
+def spread(data: Path, short: bool) -> dict[str, str]:
+    """How much of each method's result hangs on the cars that trained it, by splits and by folds."""
     models = 2 if short else 10
-    parts = []
+    parts = {}
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         train_ensemble("us101", data, "ngsim", 0, folder / "splits", splits=models)
@@ -175,8 +147,8 @@ def spread(data: Path, short: bool) -> str:
         for name, chosen, settings in (("designed-2", "splits", grid), ("us101-replay", "folds", everyone)):
             request = replace(base, scenarios=[name], model=str(folder / chosen), settings=settings)
             sweep(request, folder / name)
-            parts.append(ensemble_table(ResultFolder(folder / name).table(ENSEMBLE_CSV)))
-    return SPREAD.format(splits=models, folds=models, designed=parts[0], replay=parts[1])
+            parts[chosen] = ensemble_table(ResultFolder(folder / name).table(ENSEMBLE_CSV))
+    return parts
 
 
 def ensemble_table(frame: pd.DataFrame) -> str:
@@ -193,17 +165,13 @@ def ensemble_table(frame: pd.DataFrame) -> str:
         ]
         for row in frame.to_dict("records")
     ]
-    return markdown(["method", "runs", "failures", "failed %", "failed or stuck %", "delay s"], lines).rstrip()
+    return markdown(["method", "runs", "failures", "failed %", "failed or stuck %", "delay s"], lines)
 
 
-def main(argv: Sequence[str] | None = None) -> None:
-    """Train all models again and write the page."""
-    parser = page_parser(__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder with real NGSIM files")
-    given = parser.parse_args(argv)
-    data = given.data
+def judgement(data: Path, short: bool) -> dict[str, str]:
+    """Train all models again: whether the files are the same, a section per model, and what these say."""
     sections, both, same, wins, frames, cars = [], [], [], [], 0, 0
-    for file in sorted(MODELS.glob("*-ngsim.json" if given.short else "*.json")):  # the surrogate takes a minute
+    for file in sorted(MODELS.glob("*-ngsim.json" if short else "*.json")):  # the surrogate takes a minute
         model = IntentionModel.load(file)
         source: SourceChoice = "ngsim" if model.source == "ngsim" else "surrogate"
         split, seed = model.settings["split"], model.settings["seed"]
@@ -227,10 +195,18 @@ def main(argv: Sequence[str] | None = None) -> None:
     said = (
         "the files of the project came out the same, byte by byte" if all(same) else "NOT ALL FILES CAME OUT THE SAME"
     )
-    head = HEAD.format(same=said) + "\n" + HELD_OUT
-    tail = TAIL.format(both=" and ".join(both), better=", ".join(wins) or "none", frames=f"{frames:,}", cars=cars)
-    text = "\n\n".join([head.strip(), *(part.strip() for part in sections), spread(data, given.short), tail.strip()])
-    (given.docs / "models.md").write_text(wrapped(text) + "\n", encoding="utf-8")
+    reading = READING.format(both=" and ".join(both), better=", ".join(wins) or "none", frames=f"{frames:,}", cars=cars)
+    texts = {"same": SAME.format(same=said), "each": "\n\n".join(map(str.strip, sections)), "reading": reading}
+    return {name: wrapped(text) + "\n" for name, text in texts.items()}
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Train all models again and fill the blocks."""
+    parser = page_parser(__doc__)
+    parser.add_argument("--data", type=Path, required=True, help="folder with real NGSIM files")
+    given = parser.parse_args(argv)
+    made = judgement(given.data, given.short) | spread(given.data, given.short)
+    fill_page("models.md", given.docs, {"models": made.get})
 
 
 if __name__ == "__main__":

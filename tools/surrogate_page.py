@@ -1,4 +1,4 @@
-"""Compare the surrogate with real NGSIM pairs: python tools/surrogate_page.py --data DIR writes docs/surrogate.md."""
+"""Compare the surrogate with real NGSIM pairs: python tools/surrogate_page.py --data DIR fills docs/surrogate.md."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from blocks import page_parser, table
+from blocks import fill_page, page_parser, table
 from scipy.stats import ks_2samp
 from sklearn.metrics import roc_auc_score
 
@@ -161,28 +161,16 @@ def section(site: str, title: str, named: dict[str, Paired], docs: Path) -> str:
     draw(encounters, docs / "img" / f"surrogate-{site}.png")
     return "\n\n".join(
         [
-            f"## {title}",
             aggregates(site, named),
             f"![Distributions of the pairs of {title}](img/surrogate-{site}.png)",
             comparison(encounters),
             "How well T_h − T_m predicts which car goes first, by the merging car's distance to its lane change:",
-            ambiguity(encounters),
+            ambiguity(encounters) + "\n",
         ]
     )
 
 
-HEAD = """\
-# The surrogate
-
-Without NGSIM files the replay scenarios run on a *surrogate*: SUMO's own traffic on the same two ramps, written in
-NGSIM's columns and units and read by the same reader, with the same rules for pairs. Rows of results and
-headings then say `surrogate`. It replaces the data so that everything can be tried and tested; it is no evidence about
-human drivers. In short: speeds, distances and the share of yielding are near those of the real pairs; accelerations are
-too smooth, merging happens too early, and the order of the two cars is less clear from afar
-([where it falls short](#where-it-falls-short)).
-
-    merge-cosim ngsim surrogate --out DIR  # the files themselves; both sites take about a minute, once
-
+TRAFFIC = """\
 {minutes:.0f} minutes of traffic per site, in {recordings} recordings with a seed each: with one version of SUMO the
 same bytes every time. All drivers use SUMO's car-following model EIDM with its lane-change model LC2013; the on-ramp's
 cars come at even intervals, the others at random ones. The recipe (`merge_cosim/ngsim/surrogate/recipe.py`) was set by
@@ -195,52 +183,28 @@ Where these are fragments, not complete periods, windows and merging distances a
 Speeds and accelerations are those of the smoothed positions, by the same filter for both.
 """
 
-TAIL = """\
-## Where it falls short
-
-- **Accelerations** of SUMO's cars are too smooth: most are near zero, with a peak at -2 m/s² where drivers brake for a
-  gap. Real cars' vary all the time, also after smoothing. An estimator that learns speed transitions sees
-  less noise here than in real data.
-- **No measurement noise.** Positions are exact to NGSIM's last decimal; a filter has nothing to remove. (NGSIM's own
-  speeds accumulate at some values, visible as a comb in the pictures.)
-- **Merging happens too early**: many of SUMO's drivers change lane as soon as they may, at the very start of the
-  auxiliary lane.
-- **Slow cars.** Some of SUMO's merging cars nearly stop before they find a gap, and hosts slow down for them. None of
-  the available real ones does.
-- **Gaps** at the lane change spread wider than the real ones.
-- **Platoons.** SUMO's merging cars often merge one behind the other without a host-lane car between them; such pairs
-  are rejected, because the 'host' itself has just changed lane. These are mostly hosts ahead, so the share of yielding
-  is below one half on US-101.
-- **The order is less clear** far from the lane change than in the real US-101 pairs (the AUC above).
-- **A driver's intention is SUMO's** lane-change model, a rule. It does not model a negotiation between people.
-- **I-80**: lane 7 changes its label at a fixed place in NGSIM's data, wherever a car is across the lane; in the
-  surrogate it changes where the car does, anywhere in the 85 m beside lane 6. The place from which the
-  on-ramp is in view was chosen to match the published merging distance.
-- **Demand and speed limits** are the model's, chosen for the right speeds and gaps; they are not the site's counts.
-"""
-
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Write the page."""
+    """Fill the blocks."""
     parser = page_parser(__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with real NGSIM files")
     given = parser.parse_args(argv)
     (given.docs / "img").mkdir(parents=True, exist_ok=True)
     recipes = {name: replace(recipe, **(SHORT if given.short else {})) for name, recipe in RECIPES.items()}
-    parts, held = [], []
+    made, held = {}, []
     for site in map(find_site, ("us101",) if given.short else recipes):
-        made = site_pairs(cached_surrogate(recipes[site.name]), site, source="surrogate")
+        surrogate = site_pairs(cached_surrogate(recipes[site.name]), site, source="surrogate")
         real = site_pairs(given.data, site)
-        assert made is not None
+        assert surrogate is not None
         if real is not None:
             held.append(f"{len(real.encounters)} pairs of {len(np.unique(real.encounters.car))} cars of {site.title}")
-        parts.append(section(site.name, site.title, ({"real": real} if real else {}) | {"surrogate": made}, given.docs))
+        named = ({"real": real} if real else {}) | {"surrogate": surrogate}
+        made[site.name] = section(site.name, site.title, named, given.docs)
     recipe = recipes["us101"]
     recordings = len(recipe.seeds)
     minutes = recordings * recipe.duration / 60
-    head = HEAD.format(minutes=minutes, recordings=recordings, held="; ".join(held) or "nothing")
-    page = "\n\n".join([head.strip(), *parts, TAIL.strip()]) + "\n"
-    (given.docs / "surrogate.md").write_text(page, encoding="utf-8")
+    made["traffic"] = TRAFFIC.format(minutes=minutes, recordings=recordings, held="; ".join(held) or "nothing")
+    fill_page("surrogate.md", given.docs, {"surrogate": made.get})
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
 """`merge-cosim methods`, `scenarios`, `models`, `sensors`, `worlds` and `cache`: lists."""
 
+from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import Annotated, Any
 
 import typer
 
 from merge_cosim.cli.options import Json, Plugins
-from merge_cosim.cli.show import print_json, show_table
+from merge_cosim.cli.show import answer, print_json, show_table
 
 app = typer.Typer()
 
@@ -27,17 +28,11 @@ def methods(
 
     if name is not None:
         found = component(name, plugin or ())
-        if json:
-            print_json(found)
-        else:
-            typer.echo("\n\n".join(map(_description, found)))
+        answer(found, "\n\n".join(map(_description, found)), json)
         return
     rows = components(plugin or ())
-    if json:
-        print_json(rows)
-    else:
-        show_table([{k: v for k, v in row.items() if k != "parameters"} for row in rows], "")
-        typer.echo("merge-cosim methods NAME describes one, with its parameters.")
+    shown = [{k: v for k, v in row.items() if k != "parameters"} for row in rows]
+    _list(rows, shown, json, "merge-cosim methods NAME describes one, with its parameters.")
 
 
 @app.command()
@@ -46,11 +41,8 @@ def sensors(json: Json = False) -> None:
     from merge_cosim.scenarios.catalogue import components
 
     rows = [row for row in components() if row["role"] == "sensor"]
-    if json:
-        print_json(rows)
-    else:
-        show_table([{"sensor": row["name"], "about": row["about"]} for row in rows], "")
-        typer.echo("merge-cosim methods NAME describes one; --set sensing.model=NAME uses it.")
+    shown = [{"sensor": row["name"], "about": row["about"]} for row in rows]
+    _list(rows, shown, json, "merge-cosim methods NAME describes one; --set sensing.model=NAME uses it.")
 
 
 @app.command()
@@ -63,14 +55,12 @@ def scenarios(
     rows = [load_scenario(one) for one in ([name] if name else scenario_names())]
     about = {one.name: " ".join(one.about.split()) for one in rows}
     listed = [{"scenario": one.name, "title": one.title, "ramp": one.ramp, "about": about[one.name]} for one in rows]
-    if json:
-        print_json(listed)
-    elif name:
-        typer.echo(f"{rows[0].name}: {rows[0].title}, on the ramp {rows[0].ramp}\n")
-        typer.echo("\n".join(wrap(about[rows[0].name], WIDTH, break_on_hyphens=False)))
+    if name:
+        text = "\n".join(wrap(about[rows[0].name], WIDTH, break_on_hyphens=False))
+        answer(listed, f"{rows[0].name}: {rows[0].title}, on the ramp {rows[0].ramp}\n\n{text}", json)
     else:
-        show_table([{key: row[key] for key in ("scenario", "ramp", "title")} for row in listed], "")
-        typer.echo("merge-cosim scenarios NAME describes one.")
+        shown = [{key: row[key] for key in ("scenario", "ramp", "title")} for row in listed]
+        _list(listed, shown, json, "merge-cosim scenarios NAME describes one.")
 
 
 @app.command()
@@ -79,12 +69,9 @@ def models(json: Json = False) -> None:
     from merge_cosim.api.listing import list_models
 
     rows = list_models().to_dict("records")
-    if json:
-        print_json(rows)
-    else:
-        show_table([{str(key).replace("train_", ""): value for key, value in row.items()} for row in rows], "")
-        typer.echo("Trained on so many pairs and merging cars. A sweep takes its source's model,")
-        typer.echo("or us101-ngsim-all where no real pair is tested. --model takes another.")
+    shown = [{str(key).replace("train_", ""): value for key, value in row.items()} for row in rows]
+    about = "Trained on so many pairs and merging cars. A sweep takes its source's model,\n"
+    _list(rows, shown, json, about + "or us101-ngsim-all where no real pair is tested. --model takes another.")
 
 
 @app.command()
@@ -93,10 +80,7 @@ def worlds(json: Json = False) -> None:
     from merge_cosim.simulation.worlds.base import KINDS
 
     rows = [{"world": kind, "moved by": by, "takes": takes} for kind, (by, takes) in KINDS.items()]
-    if json:
-        print_json(rows)
-    else:
-        show_table(rows, "")
+    _list(rows, rows, json)
 
 
 @app.command()
@@ -119,6 +103,16 @@ def cache(clear: Annotated[bool, typer.Option("--clear", help="Delete it.")] = F
         print_json({"folder": str(folder), "cleared": clear, "parts": rows})
     else:
         show_table(rows, f"{folder}{' (cleared)' if clear else ''}")
+
+
+def _list(rows: Any, shown: Sequence[Mapping[str, Any]], json: bool, *more: str) -> None:
+    """Print rows as JSON, or what is shown of them as a table and what there is more to say."""
+    if json:
+        print_json(rows)
+        return
+    show_table(shown, "")
+    for text in more:
+        typer.echo(text)
 
 
 def _description(part: dict[str, Any]) -> str:

@@ -35,6 +35,7 @@ from merge_cosim.cli.options import (
     scenarios_like,
 )
 from merge_cosim.cli.show import (
+    answer,
     die,
     print_json,
     show_results,
@@ -298,10 +299,7 @@ def export(
         source=source,
         seed=seed,
     )
-    if json:
-        print_json({"commonroad" if commonroad else "sumocfg": str(file)})
-    else:
-        typer.echo(file)
+    answer({"commonroad" if commonroad else "sumocfg": str(file)}, file, json)
 
 
 @app.command()

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from merge_cosim.cli.options import Json
-from merge_cosim.cli.show import print_json
+from merge_cosim.cli.show import answer, print_json
 
 app = typer.Typer(help="Import, fetch, look at and imitate NGSIM trajectories.", no_args_is_help=True)
 
@@ -75,10 +75,7 @@ def download_(
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("download", total=None)
         path = download(out, url or PORTAL, lambda done, total: bar.update(task, completed=done, total=total))
-    if as_json:
-        print_json({"file": str(path), "bytes": path.stat().st_size})
-    else:
-        print(f"wrote {path}")
+    answer({"file": str(path), "bytes": path.stat().st_size}, f"wrote {path}", as_json)
 
 
 @app.command("summary")

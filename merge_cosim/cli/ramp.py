@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from merge_cosim.cli.options import Json
-from merge_cosim.cli.show import print_json
+from merge_cosim.cli.show import answer, print_json
 
 app = typer.Typer(help="List, check, build and edit ramps.", no_args_is_help=True)
 
@@ -45,10 +45,8 @@ def check_(which: Which, as_json: Json = False) -> None:
 
     folder = find_ramp(which)
     problems, remarks = check(folder), notes(folder)
-    if as_json:
-        print_json({"folder": str(folder), "problems": problems, "notes": remarks})
-    else:
-        print("\n".join([*(problems or [f"{folder}: no problem found"]), *remarks]))
+    lines = [*(problems or [f"{folder}: no problem found"]), *remarks]
+    answer({"folder": str(folder), "problems": problems, "notes": remarks}, "\n".join(lines), as_json)
     if problems:
         raise typer.Exit(1)
 
@@ -63,10 +61,7 @@ def build_(which: Which, as_json: Json = False) -> None:
     folder = find_ramp(which)
     net = build(folder)
     problems = check(folder)
-    if as_json:
-        print_json({"net": str(net), "problems": problems})
-    else:
-        print("\n".join([f"wrote {net}", *problems]))
+    answer({"net": str(net), "problems": problems}, "\n".join([f"wrote {net}", *problems]), as_json)
     if problems:
         raise typer.Exit(1)
 
@@ -166,7 +161,5 @@ def _print_found(folder: Path, wrote: str, found: list[str], as_json: bool, *mor
     from merge_cosim.ramps.check import check, notes
 
     problems, remarks = check(folder), notes(folder)
-    if as_json:
-        print_json({"folder": str(folder), "found": found, "problems": problems, "notes": remarks})
-        return
-    print("\n".join([wrote, *found, *problems, *remarks, *more]))
+    document = {"folder": str(folder), "found": found, "problems": problems, "notes": remarks}
+    answer(document, "\n".join([wrote, *found, *problems, *remarks, *more]), as_json)

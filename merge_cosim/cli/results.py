@@ -21,6 +21,7 @@ from merge_cosim.cli.options import (
     World,
 )
 from merge_cosim.cli.show import (
+    answer,
     print_json,
     show_results,
     show_short_table,
@@ -59,16 +60,10 @@ def report(
     results = Results(folder)
     if figures is not None:
         files = results.figures(figures, width, font_size, columns.split(",") if columns else ())
-        if json:
-            print_json({"files": [str(file) for file in files]})
-        else:
-            typer.echo(f"{len(files)} files in {figures}")
+        answer({"files": [str(file) for file in files]}, f"{len(files)} files in {figures}", json)
         return
     file = results.report(against=against)
-    if json:
-        print_json({"report": str(file)})
-    else:
-        typer.echo(file)
+    answer({"report": str(file)}, file, json)
 
 
 @app.command()
@@ -217,10 +212,8 @@ def reproduce(
 
     with resumable(f"what was finished is kept in {out}; the same command goes on"):
         file, studies = run_studies(out, data=data, jobs=jobs, seed=seed, world=world)
-    if json:
-        print_json({"report": str(file), "studies": {name: str(study.path) for name, study in studies.items()}})
-    else:
-        typer.echo(file)
+    document = {"report": str(file), "studies": {name: str(study.path) for name, study in studies.items()}}
+    answer(document, file, json)
 
 
 @app.command()
@@ -287,10 +280,7 @@ def bench(
             typer.echo(f"{part}: {crowded.strip().strip('*')}", err=True)
     if page is not None:
         figures.write_page(page, found, command, before)
-    if json:
-        print_json(found)
-    else:
-        typer.echo(figures.page(found, command, before))
+    answer(found, figures.page(found, command, before), json)
     worse = [row for row in regression.against(found, before, figures.TOLERANCE) if row["worse"]] if before else []
     for row in worse:
         typer.echo(f"{row['ratio']}: {row['before']} before, {row['now']} now", err=True)

@@ -21,6 +21,14 @@ def print_json(document: Any) -> None:
     print(json.dumps(_finite(document), indent=1, default=str, allow_nan=False))
 
 
+def answer(document: Any, text: object, as_json: bool) -> None:
+    """Print a document for programs, or what people read instead."""
+    if as_json:
+        print_json(document)
+    else:
+        print(text)
+
+
 def _finite(document: Any) -> Any:
     if isinstance(document, dict):
         return {key: _finite(value) for key, value in document.items()}
