@@ -30,7 +30,7 @@ def collision_table(results: pd.DataFrame) -> Table:
         counted[kind] = rows["failure_kind"] == kind
         columns.append(Column(kind, kind.replace("_", " "), 0, "our failures by kind"))
     data = counted.groupby(["scenario", "source"], as_index=False).sum()
-    return Table.of(data, columns, [False] * len(data), "SUMO's collision report against our geometry")
+    return Table.of(data, columns, "SUMO's collision report against our geometry")
 
 
 def explained(results: pd.DataFrame) -> list[tuple[int, str, str]]:

@@ -10,6 +10,7 @@ import pandas as pd
 
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.registry import did_you_mean
+from merge_cosim.scenarios.methods import is_reference
 
 MISSING = "–"
 
@@ -75,8 +76,9 @@ class Table:
     subject: str = ""
 
     @classmethod
-    def of(cls, data: pd.DataFrame, columns: Sequence[Column], apart: Sequence[bool], title: str) -> Table:
-        """Make a table; columns without any value are left out."""
+    def of(cls, data: pd.DataFrame, columns: Sequence[Column], title: str) -> Table:
+        """Make a table; columns without any value are left out, and rows of reference methods are apart."""
+        apart = map(is_reference, data["method"]) if "method" in data else (False for _ in data.index)
         kept = tuple(column for column in columns if data[column.name].notna().any())
         return cls(data[[column.name for column in kept]].reset_index(drop=True), kept, tuple(apart), title)
 

@@ -21,7 +21,6 @@ from merge_cosim.results.statistics.paired import sign_flip_p
 from merge_cosim.results.statistics.rates import bootstrap_means
 from merge_cosim.results.statistics.summary import is_sample_source
 from merge_cosim.results.store import MANIFEST, ResultFolder
-from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
 
 GROUP = ["scenario", "variation", "site", "source", "method"]
@@ -89,14 +88,11 @@ def compare(first: Path, second: Path, methods: tuple[str, str] | None = None) -
             for side, heading, decimals in SIDES
         ),
     ]
-    if methods is None:
-        apart, title = list(map(is_reference, data["method"])), f"A: {first}, B: {second}"
-    else:
-        apart, title = [False] * len(data), f"A: {first}, {methods[0]}; B: {second}, {methods[1]}"
+    title = f"A: {first}, B: {second}" if methods is None else f"A: {first}, {methods[0]}; B: {second}, {methods[1]}"
     notes = [f"{others:,} cases of the same name begin otherwise and are left out"] if others else []
     if first != second:
         notes += _differences(folders, held, methods is None)
-    return Table.of(data, columns, apart, title), notes
+    return Table.of(data, columns, title), notes
 
 
 def _held(folder: ResultFolder) -> pd.DataFrame:

@@ -9,7 +9,6 @@ from merge_cosim.report.methods import in_order
 from merge_cosim.report.tables import METHOD, MODEL, Section, of_section, ranges, with_models
 from merge_cosim.results.statistics import belief
 from merge_cosim.results.statistics.summary import ALL_STARTS
-from merge_cosim.scenarios.methods import is_reference
 
 SAFETY = (
     METHOD,
@@ -57,7 +56,7 @@ def safety_table(summary: pd.DataFrame, section: Section) -> Table:
         Column("mcnemar_p", "McNemar p", 4, group, probability=True),
     )
     title = "Surrogate safety, and failures on the same cases"
-    return Table.of(rows, (*SAFETY, *compared), list(map(is_reference, rows["method"])), title)
+    return Table.of(rows, (*SAFETY, *compared), title)
 
 
 def belief_table(results: pd.DataFrame, section: Section) -> Table | None:
@@ -70,4 +69,4 @@ def belief_table(results: pd.DataFrame, section: Section) -> Table | None:
     order = {method: i for i, method in enumerate(in_order(found["method"]))}
     found = found.assign(order=found["method"].map(order)).sort_values(["order", "gate_m"], ascending=[True, False])
     title = "Beliefs at fixed distances of the merging car"
-    return Table.of(found, BELIEF, list(map(is_reference, found["method"])), title)
+    return Table.of(found, BELIEF, title)

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 PGM_PAPER = "Dong, Dolan, Litkouhi 2017 (PGM), Table II"
 FG_GMM_PAPER = "Lyu, Dong, Dolan 2020 (FG-GMM), Table III"
 
-MIXTURE_TABLE = "Lyu, Dong, Dolan 2020 (FG-GMM), Table I"
-
 
 @dataclass(frozen=True)
 class Figure:
@@ -17,12 +15,10 @@ class Figure:
     Attributes:
         failure_pct: Failure rate [%].
         distance_m: Mean distance to the merging car when the host reaches the merging point [m]; None if not given.
-        source: Paper and table.
     """
 
     failure_pct: float
     distance_m: float | None = None
-    source: str = PGM_PAPER
 
 
 PUBLISHED: dict[str, dict[str, Figure]] = {
@@ -32,7 +28,7 @@ PUBLISHED: dict[str, dict[str, Figure]] = {
         "ipcb": Figure(19.3, 23.7),
         "pgm-g": Figure(20.1, 24.3),
         "pgm": Figure(8.7, 25.8),
-        "fg-gmm": Figure(7.3, 23.3, FG_GMM_PAPER),
+        "fg-gmm": Figure(7.3, 23.3),
     },
     "i80-replay": {
         "acc": Figure(16.5, 7.0),
@@ -40,7 +36,7 @@ PUBLISHED: dict[str, dict[str, Figure]] = {
         "ipcb": Figure(15.8, 13.7),
         "pgm-g": Figure(11.3, 14.6),
         "pgm": Figure(7.6, 16.4),
-        "fg-gmm": Figure(7.0, 14.7, FG_GMM_PAPER),
+        "fg-gmm": Figure(7.0, 14.7),
     },
     "designed-1": {
         "acc": Figure(13.3),
@@ -57,7 +53,8 @@ PUBLISHED: dict[str, dict[str, Figure]] = {
         "pgm": Figure(0.2),
     },
 }
-"""By scenario and method. Designed Test I is published over both sites together."""
+"""By scenario and method, of `PGM_PAPER`; fg-gmm of `FG_GMM_PAPER`. Designed Test I is published over both sites
+together."""
 
 CYCLE_MS = {"acc": 0.05, "ipcb": 0.20, "pgm-g": 0.51, "pgm": 0.08, "fg-gmm": 0.08}
 """Published mean time per cycle [ms]."""
@@ -82,7 +79,6 @@ class Component:
         mean_before, mean_now: Its mean [ft/s].
         variance: Variance of V_{t-1} [ft^2/s^2].
         covariance: Covariance of both speeds [ft^2/s^2].
-        source: Paper and table.
     """
 
     weight: float
@@ -90,14 +86,14 @@ class Component:
     mean_now: float
     variance: float
     covariance: float
-    source: str = MIXTURE_TABLE
 
 
 PUBLISHED_MIXTURES: dict[str, tuple[Component, Component]] = {
     "YIELD": (Component(0.57, 17.59, 17.58, 64.04, 64.00), Component(0.42, 43.51, 43.50, 106.53, 106.77)),
     "NOT_YIELD": (Component(0.56, 17.87, 17.87, 66.25, 66.20), Component(0.43, 44.02, 44.01, 106.96, 107.20)),
 }
-"""By intention, slower component first (the paper prints NOT_YIELD's the other way round)."""
+"""By intention, slower component first (the paper prints NOT_YIELD's the other way round): Lyu, Dong, Dolan 2020
+(FG-GMM), Table I."""
 
 
 def published(scenario: str, method: str) -> Figure | None:

@@ -14,7 +14,7 @@ from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order
 from merge_cosim.report.published import published
 from merge_cosim.results.statistics.summary import ALL_SITES, AMBIGUITY_EDGES, by_start
-from merge_cosim.scenarios.methods import HUMAN, ORACLE_BEST, is_reference
+from merge_cosim.scenarios.methods import HUMAN, ORACLE_BEST
 
 METHOD = Column("method", "method")
 MODEL = Column("model", "model")
@@ -101,7 +101,7 @@ def sections(summary: pd.DataFrame) -> list[Section]:
 def main_table(summary: pd.DataFrame, section: Section) -> Table:
     """Every measure per method, ours beside the published figures."""
     rows = with_models(of_section(summary, section))
-    return Table.of(rows, MAIN, list(map(is_reference, rows["method"])), "Outcome by method")
+    return Table.of(rows, MAIN, "Outcome by method")
 
 
 def strata_table(results: pd.DataFrame, section: Section) -> Table:
@@ -126,7 +126,7 @@ def strata_table(results: pd.DataFrame, section: Section) -> Table:
         data[f"n_{key}"] = failed.size().reindex(methods).fillna(0).astype(int).to_numpy()
         data[f"failure_pct_{key}"] = (100 * failed.mean().reindex(methods)).to_numpy()
     title = "Failures by ambiguity at the start, |T_m − T_h|"
-    return Table.of(data, columns, list(map(is_reference, methods)), title)
+    return Table.of(data, columns, title)
 
 
 def variation_table(summary: pd.DataFrame, scenario: str, parameter: str) -> Table:
@@ -140,7 +140,7 @@ def variation_table(summary: pd.DataFrame, scenario: str, parameter: str) -> Tab
     columns = [METHOD, Column("value", parameter), *(column for column in MAIN[2:] if column.group not in NOT_VARIED)]
     many = [name for name in ("site", "source") if rows[name].nunique() > 1]
     columns[1:1] = [Column(name, name) for name in many]
-    return Table.of(rows, columns, list(map(is_reference, rows["method"])), f"{scenario}: {parameter} varied")
+    return Table.of(rows, columns, f"{scenario}: {parameter} varied")
 
 
 def varied_parameters(summary: pd.DataFrame) -> list[tuple[str, str]]:

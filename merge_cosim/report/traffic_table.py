@@ -9,7 +9,6 @@ import pandas as pd
 
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order
-from merge_cosim.scenarios.methods import is_reference
 
 COLUMNS = (
     Column("scenario", "scenario"),
@@ -55,4 +54,4 @@ def traffic_table(rows: Sequence[dict[str, Any]]) -> Table | None:
         key=lambda column: column.map(order) if column.name == "method" else column.fillna(""),
         kind="stable",
     )
-    return Table.of(frame, COLUMNS, list(map(is_reference, frame["method"])), "The traffic as a whole")
+    return Table.of(frame, COLUMNS, "The traffic as a whole")

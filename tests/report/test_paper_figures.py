@@ -65,15 +65,17 @@ def test_an_unknown_column_is_one_line_and_status_2(command, swept, tmp_path, ca
 
 def test_text_means_nothing_to_latex():
     data = pd.DataFrame({"method": ["a_b & 5 %"], "x": [1.0]})
-    text = latex(Table.of(data, [Column("method", "method"), Column("x", "x < 2", 1)], [False], "T_1"), "tab:x")
+    text = latex(Table.of(data, [Column("method", "method"), Column("x", "x < 2", 1)], "T_1"), "tab:x")
     assert r"a\_b \& 5 \% & 1.0" in text
     assert "x $<$ 2" in text
 
 
 def test_ties_are_all_best_and_columns_without_a_direction_have_none():
-    data = pd.DataFrame({"method": list("abc"), "less": [1.04, 1.0, 0.0], "more": [1, 2, 3], "x": [1, 2, 3]})
+    data = pd.DataFrame(
+        {"method": ["a", "b", "always-go"], "less": [1.04, 1.0, 0.0], "more": [1, 2, 3], "x": [1, 2, 3]}
+    )
     columns = [Column("method", "m"), Column("less", "l", 1, better=-1), Column("more", "m", 0, better=1)]
-    table = Table.of(data, [*columns, Column("x", "x", 0)], [False, False, True], "t")
+    table = Table.of(data, [*columns, Column("x", "x", 0)], "t")
     assert table.best() == [[False, False, False, False], [False, False, True, False], [False] * 4]
 
 

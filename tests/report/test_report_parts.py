@@ -49,7 +49,7 @@ def test_strata_part_the_cases_by_their_ambiguity(swept):
 
 def test_tables_become_files_of_two_kinds(tmp_path):
     data = pd.DataFrame({"method": ["acc"], "p": [0.25]})
-    table = Table.of(data, [Column("method", "method"), Column("p", "p", 2)], [False], "One & only")
+    table = Table.of(data, [Column("method", "method"), Column("p", "p", 2)], "One & only")
     files = write_tables(tmp_path, {"a/b c": table})
     assert [file.name for file in files] == ["a-b-c.csv", "a-b-c.tex"]
     pd.testing.assert_frame_equal(pd.read_csv(files[0]), data)

@@ -87,9 +87,7 @@ def test_numbers_as_text(value, decimals, text):
 
 
 def test_a_column_without_values_is_left_out():
-    table = Table.of(
-        pd.DataFrame({"a": [1.0], "b": [None]}), [Column("a", "a", 0), Column("b", "b", 0)], [False], "T_1"
-    )
+    table = Table.of(pd.DataFrame({"a": [1.0], "b": [None]}), [Column("a", "a", 0), Column("b", "b", 0)], "T_1")
     assert [column.name for column in table.columns] == ["a"]
     assert r"\caption{T\_1}" in latex(table)
 

@@ -58,7 +58,7 @@ def claims_table(evidence: Evidence) -> Table:
         rows.append({"claim": claim.text, "paper": claim.paper, "verdict": verdict.word, "evidence": verdict.evidence})
     columns = [Column("claim", "claim", prose=True), Column("paper", "paper"), Column("verdict", "verdict")]
     columns.append(Column("evidence", "evidence", prose=True))
-    return Table.of(pd.DataFrame(rows), columns, [False] * len(rows), "The papers' claims and our verdict")
+    return Table.of(pd.DataFrame(rows), columns, "The papers' claims and our verdict")
 
 
 def _pgm_is_best(evidence: Evidence) -> Verdict:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ngsim.sites import site
@@ -43,6 +45,24 @@ ABOUT_BELIEFS = (
     "Closed loop: what each estimator believed when the merging car first was this far from the merging point, against "
     "the label of the case. Rules without doubt have an accuracy only."
 )
+LEARNED: dict[Callable[[IntentionModel], Figure], str] = {
+    model_figures.transition_figure: "Speed transitions at given speeds for both intentions (PGM, transition "
+    "probabilities).",
+    model_figures.arrival_figure: "Times to arrival of both cars for both intentions (PGM, time model), and the "
+    "log-odds that follow.",
+    model_figures.mixture_figure: "V(t-1) × V(t) for both intentions (FG-GMM, Fig. 5), with the components of the "
+    "mixture at 1 and 2 sigma.",
+}
+"""Figures of what a model learned, and their captions."""
+AT_WORK: dict[Callable[[IntentionModel], Figure], str] = {
+    belief_figures.clouds_figure: "Particles before, between and after one update: a driver that has begun to "
+    "accelerate.",
+    belief_figures.belief_figure: "The belief over 12 s: a driver that stays behind, and one that pulls ahead from 5 s "
+    "on.",
+    belief_figures.candidates_figure: "What iPCB's planner weighs for a merging car that is behind but accelerates "
+    "(PGM, Fig. 3).",
+}
+"""Figures of an estimator and a planner at work, and their captions."""
 
 
 @dataclass(frozen=True)
@@ -147,28 +167,11 @@ def _learned(model: IntentionModel) -> Part:
         f"Model {model.name}, trained on {int(model.pairs.sum())} pairs of {len(model.trained_on)} merging cars, none "
         f"of which is tested."
     )
-    pictures = [
-        Picture.of(
-            model_figures.transition_figure(model),
-            "Speed transitions at given speeds for both intentions (PGM, transition probabilities).",
-            wide=True,
-        ),
-        Picture.of(
-            model_figures.arrival_figure(model),
-            "Times to arrival of both cars for both intentions (PGM, time model), and the log-odds that follow.",
-            wide=True,
-        ),
-        Picture.of(
-            model_figures.mixture_figure(model),
-            "V(t-1) × V(t) for both intentions (FG-GMM, Fig. 5), with the components of the mixture at 1 and 2 sigma.",
-            wide=True,
-        ),
-    ]
     return Part(
         "What was learned (PGM, speed and time model; FG-GMM, Table I and Fig. 5)",
         about,
         {"mixture": tables.mixture(model)},
-        pictures,
+        _drawn(LEARNED, model),
     )
 
 
@@ -211,22 +214,9 @@ def _on_camera(data: Path | None) -> Part:
 
 def _particle_filter() -> Part:
     model = IntentionModel.load("us101-ngsim")
-    pictures = [
-        Picture.of(
-            belief_figures.clouds_figure(model),
-            "Particles before, between and after one update: a driver that has begun to accelerate.",
-            wide=True,
-        ),
-        Picture.of(
-            belief_figures.belief_figure(model),
-            "The belief over 12 s: a driver that stays behind, and one that pulls ahead from 5 s on.",
-            wide=True,
-        ),
-        Picture.of(
-            belief_figures.candidates_figure(model),
-            "What iPCB's planner weighs for a merging car that is behind but accelerates (PGM, Fig. 3).",
-            wide=True,
-        ),
-    ]
     about = f"Designed approaches, no data; the driver's desired speed is that of model {model.name}."
-    return Part("The particle filter (DBN-PF) and iPCB at work", about, pictures=pictures)
+    return Part("The particle filter (DBN-PF) and iPCB at work", about, pictures=_drawn(AT_WORK, model))
+
+
+def _drawn(figures: Mapping[Callable[[IntentionModel], Figure], str], model: IntentionModel) -> list[Picture]:
+    return [Picture.of(draw(model), caption, wide=True) for draw, caption in figures.items()]

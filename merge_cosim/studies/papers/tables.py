@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from merge_cosim.core.encounter import Intention
+from merge_cosim.core.units import FOOT
 from merge_cosim.estimators.learned.model import IntentionModel
 from merge_cosim.ngsim.pairing.encounters import site_pairs
 from merge_cosim.ngsim.pairing.summary import Summary, summarise, summarise_folder
@@ -16,12 +18,10 @@ from merge_cosim.ngsim.surrogate.recipe import RECIPES
 from merge_cosim.ngsim.surrogate.surrogate import surrogate_folder
 from merge_cosim.report.columns import Column, Table
 from merge_cosim.report.methods import in_order
-from merge_cosim.report.model_tables import gmm_table
-from merge_cosim.report.published import CYCLE_MS, VALIDITY, Figure, published
+from merge_cosim.report.published import CYCLE_MS, PUBLISHED_MIXTURES, VALIDITY, Figure, published
 from merge_cosim.report.tables import ranges
 from merge_cosim.results.statistics.ensemble import ensemble
 from merge_cosim.results.statistics.rates import wilson
-from merge_cosim.scenarios.methods import is_reference
 from merge_cosim.scenarios.scenario import load_scenario
 from merge_cosim.studies.bounds import MOST_DELAY, bounds_of
 from merge_cosim.studies.papers.evidence import Evidence
@@ -73,7 +73,7 @@ def data_sets(source: str, data: Path | None) -> Table:
         Column("published_merge_distance_m", "L_merge m", 1, "published"),
         Column("published_speed_m_s", "space-mean speed m/s", 1, "published"),
     ]
-    return Table.of(pd.DataFrame(rows), columns, [False] * len(rows), "Features of the data sets")
+    return Table.of(pd.DataFrame(rows), columns, "Features of the data sets")
 
 
 def outcomes(evidence: Evidence) -> dict[str, Table]:
@@ -140,7 +140,7 @@ def extended(evidence: Evidence) -> Table:
                 Column(f"{key}_interval_pct", "95 %", None, group, range=True),
             ]
     title = "Failures of pairs logged to the end of scoring, and of pairs carried on at their last speed"
-    return Table.of(data, columns, list(map(is_reference, methods)), title)
+    return Table.of(data, columns, title)
 
 
 def over_models(evidence: Evidence) -> Table:
@@ -155,7 +155,7 @@ def over_models(evidence: Evidence) -> Table:
     ):
         columns += [Column(f"{name}_{what}", what, 2, group) for what in ("median", "min", "max")]
     title = "Designed Test II with models that were each trained on another third of the merging cars"
-    return Table.of(rows, columns, [False] * len(rows), title)
+    return Table.of(rows, columns, title)
 
 
 def bounds(study: Study) -> Table:
@@ -174,7 +174,7 @@ def bounds(study: Study) -> Table:
         Column("infeasible_in_time", f"infeasible within {MOST_DELAY:g} s of free driving", 0),
         Column("min_delay_s", "mean of the smallest delays s", 2),
     ]
-    return Table.of(pd.DataFrame(rows), columns, [False] * len(rows), "What any host could have done")
+    return Table.of(pd.DataFrame(rows), columns, "What any host could have done")
 
 
 def _by_test(
@@ -198,7 +198,7 @@ def _by_test(
             figures = [published(name, method) for method in methods]
             data[f"{name}_published"] = np.array([theirs(one) if one else None for one in figures], dtype=float)
             columns.append(Column(f"{name}_published", "published", 1, group))
-    return Table.of(data, columns, list(map(is_reference, methods)), title)
+    return Table.of(data, columns, title)
 
 
 def _times(evidence: Evidence) -> Table:
@@ -212,7 +212,7 @@ def _times(evidence: Evidence) -> Table:
         Column("cycle_us_single", "alone", 1, "µs per update"),
         Column("published", "published", 0, "µs per update"),
     ]
-    return Table.of(data, columns, list(map(is_reference, methods)), "Time of one update")
+    return Table.of(data, columns, "Time of one update")
 
 
 def validity(evidence: Evidence) -> Table:
@@ -237,7 +237,7 @@ def validity(evidence: Evidence) -> Table:
             Column(f"{method}_pct", "%", 1, group),
             Column(f"{method}_published_pct", "published %", 0, group),
         ]
-    return Table.of(pd.DataFrame(rows), columns, [False] * len(rows), "Validity of FG and GMM")
+    return Table.of(pd.DataFrame(rows), columns, "Validity of FG and GMM")
 
 
 def nodes(evidence: Evidence) -> Table:
@@ -252,7 +252,7 @@ def nodes(evidence: Evidence) -> Table:
         Column("decision_flips", "flips", 2),
         Column("delay_s", "delay s", 2),
     ]
-    return Table.of(data, columns, [False] * len(data), "PGM by its number of speed nodes, us101-replay")
+    return Table.of(data, columns, "PGM by its number of speed nodes, us101-replay")
 
 
 def beliefs(evidence: Evidence) -> dict[str, Table]:
@@ -269,14 +269,32 @@ def beliefs(evidence: Evidence) -> dict[str, Table]:
             ):  # fmt: skip
                 data[f"{name}_{gate}"] = at[name].to_numpy(dtype=float)
                 columns.append(Column(f"{name}_{gate}", heading, decimals, f"at {gate} m"))
-        apart = list(map(is_reference, methods))
-        found[f"beliefs-{scenario}-{site}"] = Table.of(data, columns, apart, f"{TESTS[str(scenario)]}: beliefs")
+        found[f"beliefs-{scenario}-{site}"] = Table.of(data, columns, f"{TESTS[str(scenario)]}: beliefs")
     return found
 
 
 def mixture(model: IntentionModel) -> Table:
-    """Parameters of the 2-component mixtures beside the published ones (Lyu, Dong, Dolan 2020, Table I)."""
-    data = pd.DataFrame(gmm_table(model))
+    """Parameters of the speed mixtures at lag 1 beside the published ones (Lyu, Dong, Dolan 2020, Table I).
+
+    The variance of V_t was not published.
+    """
+    ours = model.speed(1).mixture
+    rows = []
+    for intention in (Intention.YIELD, Intention.NOT_YIELD):
+        pairs = zip(("slow", "fast"), PUBLISHED_MIXTURES[intention.name], strict=True)
+        for k, (component, paper) in enumerate(pairs):  # both are ordered by their mean
+            mean, covariance = ours.means[intention, k] / FOOT, ours.covariances[intention, k] / FOOT**2
+            both: dict[str, tuple[float, float | None]] = {
+                "weight": (ours.weights[intention, k], paper.weight),
+                "mean of V_{t-1} [ft/s]": (mean[0], paper.mean_before),
+                "mean of V_t [ft/s]": (mean[1], paper.mean_now),
+                "variance of V_{t-1} [ft^2/s^2]": (covariance[0, 0], paper.variance),
+                "covariance [ft^2/s^2]": (covariance[0, 1], paper.covariance),
+                "variance of V_t [ft^2/s^2]": (covariance[1, 1], None),
+            }
+            rows += [
+                (intention.name, component, name, round(float(own), 4), theirs) for name, (own, theirs) in both.items()
+            ]
     columns = [
         Column("intention", "intention"),
         Column("component", "component"),
@@ -284,8 +302,8 @@ def mixture(model: IntentionModel) -> Table:
         Column("ours", "ours", 2),
         Column("published", "published", 2),
     ]
-    title = "Mixture of speed transitions, in ft/s; components matched by their mean speed"
-    return Table.of(data, columns, [False] * len(data), title)
+    data = pd.DataFrame(rows, columns=[column.name for column in columns])
+    return Table.of(data, columns, "Mixture of speed transitions, in ft/s; components matched by their mean speed")
 
 
 def _surrogate_summaries() -> list[Summary]:
