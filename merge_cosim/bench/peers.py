@@ -44,14 +44,7 @@ def peers(commonroad_python: Path | None = None) -> list[dict[str, Any]]:
 def environment_steps(
     encounters: int = ENCOUNTERS, warm_up: int = WARM_UP, steps: int = STEPS, **options: Any
 ) -> float:
-    """Environment steps per second of processor time of the vector environment, under random actions.
-
-    Args:
-        encounters: How many run side by side.
-        warm_up: Steps before the timing starts, so that encounters of every age run side by side.
-        steps: Steps that are timed.
-        options: Of the environment, for example `scenario`.
-    """
+    """Environment steps per second of processor time of the vector environment, under random actions."""
     import gymnasium
 
     import merge_cosim.gym

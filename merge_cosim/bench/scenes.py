@@ -19,8 +19,7 @@ SETTINGS = {
 def scene_costs(copies: int) -> list[dict[str, Any]]:
     """A row per car-following model: cars on average, real-time factor of the whole loop, share of SUMO's steps.
 
-    Args:
-        copies: Copies of the ramp; about 140 cars drive on each.
+    About 140 cars drive on each copy of the ramp.
     """
     return [_cost(model, copies) for model in MODELS]
 

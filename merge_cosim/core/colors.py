@@ -31,10 +31,6 @@ Rgba = tuple[int, int, int, int]
 
 
 def rgba(color: str) -> Rgba:
-    """An opaque colour as four numbers.
-
-    Args:
-        color: It as `#rrggbb`.
-    """
+    """An opaque colour as four numbers."""
     red, green, blue = bytes.fromhex(color.removeprefix("#"))
     return red, green, blue, 255

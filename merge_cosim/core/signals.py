@@ -116,9 +116,6 @@ def interrupts_ignored(*blocked: signal.Signals) -> Iterator[None]:
 def starts_silently(file: IO[bytes]) -> Iterator[Connection | None]:
     """Processes that are started here print to a file on standard error, as where they lack memory for their start.
 
-    Args:
-        file: The file.
-
     Yields:
         This process's own standard error, to be given to a process, which can then turn to it; None on Windows.
     """

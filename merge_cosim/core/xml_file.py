@@ -19,11 +19,7 @@ _DAMAGED = (etree.XMLSyntaxError, EOFError, zlib.error, gzip.BadGzipFile)
 
 
 def read_xml(file: Path, blanks: bool = True) -> etree._Element:
-    """Root of an XML file, which may be compressed with gzip.
-
-    Args:
-        file: The file.
-        blanks: Keep text that is blank, and comments.
+    """Root of an XML file, which may be compressed with gzip; without `blanks` blank text and comments are left out.
 
     Raises:
         UserError: The file is missing, cannot be read, is no XML, has a document type, or is too large.

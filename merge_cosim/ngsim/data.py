@@ -65,10 +65,6 @@ def find_data(option: Path | None) -> Path | None:
 def data_files(data: Path, layout: Layout = NGSIM) -> list[DataFile]:
     """Look into every file of a data folder (or at the one file named), sorted by path.
 
-    Args:
-        data: The folder or file.
-        layout: How trajectory files may be laid out, if they are not canonical.
-
     Raises:
         UserError: A file is damaged.
     """

@@ -174,10 +174,6 @@ class Source:
 def sources(path: Path, layout: Layout = NGSIM) -> list[Source]:
     """Look into a file: one source, or one for each member of a zip archive.
 
-    Args:
-        path: The file.
-        layout: How the file may be laid out, if it is not canonical.
-
     Raises:
         UserError: The file is missing, cannot be read or is damaged.
     """

@@ -41,12 +41,7 @@ STAND_INS = {
 
 
 def check(folder: Path, just_built: bool = False) -> list[str]:
-    """Every problem of a ramp, one line each; an empty list if there is none.
-
-    Args:
-        folder: The ramp's folder.
-        just_built: Its net need not be compared with what its plain XML builds.
-    """
+    """Every problem of a ramp, a line each; none: it is sound. A net `just_built` is not compared with its sources."""
     try:
         file = read_ramp_file(folder)
         net = read_net(folder / file.net)

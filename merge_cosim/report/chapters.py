@@ -82,17 +82,7 @@ def chapter(
     verdict: Verdict,
     recorded: Sequence[dict[str, Any]],
 ) -> Chapter:
-    """Make the chapter of a section.
-
-    Args:
-        number: Its place in the page, from 1 on.
-        section: What it is about.
-        results: All result rows.
-        summary: All summary rows.
-        manifest: The sweep's manifest.
-        verdict: The verdict of this section.
-        recorded: All recorded cases.
-    """
+    """Make the chapter of a section."""
     rows = section.of(results)
     scenario = manifest["scenarios"][section.scenario]
     kind = scenario["encounters"]["kind"]

@@ -13,12 +13,7 @@ FOLDER = "tables"
 
 
 def write_tables(folder: Path, tables: Mapping[str, Table]) -> list[Path]:
-    """Write each table as `tables/NAME.csv` and `tables/NAME.tex` with the label `tab:NAME`; returns the files.
-
-    Args:
-        folder: Result folder.
-        tables: Tables by name.
-    """
+    """Write each table as `tables/NAME.csv` and `tables/NAME.tex` with the label `tab:NAME`; returns the files."""
     target = folder / FOLDER
     target.mkdir(parents=True, exist_ok=True)
     files = []

@@ -34,11 +34,7 @@ class Shares:
 
 
 def failure_shares(results: pd.DataFrame) -> Shares:
-    """Count the failures of each method by both initial speeds, in classes where there are many speeds.
-
-    Args:
-        results: Rows of one scenario.
-    """
+    """Count the failures of each method in one scenario by both initial speeds, in classes where there are many."""
     speeds = results[["host_speed_0", "merging_speed_0"]].set_axis(["host", "merging"], axis=1)
     if speeds.nunique().max() > MOST_SPEEDS:
         speeds = _classes(speeds, len(results) / results["method"].nunique())

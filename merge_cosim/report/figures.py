@@ -41,12 +41,7 @@ def write_figures(
 ) -> list[Path]:
     """Write every figure of a result folder as `NAME.svg`, `.pdf`, `.png` and `.csv`, and the tables beside them.
 
-    Args:
-        folder: The result folder.
-        out: Where the files go; the tables go to `tables/` in it.
-        width_cm: Width of every figure [cm]; None for the width of the page's own.
-        font_size: Size of the type [pt].
-        columns: Columns of the tables of outcomes; all, if empty.
+    The arguments are those of `Results.figures`.
 
     Returns:
         The files.

@@ -25,12 +25,7 @@ def frame(page: str, title: str) -> str:
 
 
 def case_page(row: Mapping[str, Any], trace: pd.DataFrame) -> str:
-    """The case viewer with one case under one method.
-
-    Args:
-        row: Its result row.
-        trace: Its record, one row per cycle.
-    """
+    """The case viewer with one case under one method."""
     names = {name: str(row[name]) for name in ("scenario", "case", "method")}
     recorded = recorded_cases(trace.assign(**names), pd.DataFrame([dict(row) | {"variation": ""}]))
     data = {"methods": page_data.method_looks(looks([names["method"]])), "cases": recorded}

@@ -24,11 +24,8 @@ ROOM = 1.2
 def tradeoff_figure(rows: Sequence[Mapping[str, Any]], looks: Mapping[str, Look]) -> Figure:
     """Failed or stuck against mean delay: a dot per method with its intervals; references are hollow.
 
-    The axes hold the methods that compete. References beyond are drawn at the edge with their values.
-
-    Args:
-        rows: Entries of `page_data.outcome_rows`.
-        looks: How the methods are drawn.
+    The axes hold the methods that compete. References beyond are drawn at the edge with their values. The
+    rows are those of `page_data.outcome_rows`.
     """
     known = [row for row in rows if row["bad_pct"] is not None and row["delay"] is not None]
     inside = [row for row in known if not row["reference"]] or known

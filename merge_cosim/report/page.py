@@ -113,11 +113,7 @@ def read_report(folder: Path, against: str | None = None) -> Report:
 
 
 def write_report(folder: Path, against: str | None = None) -> Path:
-    """Write `report.html` and `tables/` into a result folder; returns the page.
-
-    Args:
-        folder: The result folder.
-        against: Method to compare the others with; None for the one that the sweep chose.
+    """Write `report.html` and `tables/` into a result folder; returns the page; see `read_report`.
 
     Raises:
         UserError: The folder holds no finished sweep, or not the method to compare with.

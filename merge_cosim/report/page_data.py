@@ -35,11 +35,6 @@ def outcome_rows(summary: pd.DataFrame, rows: pd.DataFrame, verdict: Verdict) ->
     """One entry per method, the best first and references last: the numbers of the chart and of the short table.
 
     Of a method with several models the median, and the range in place of the intervals.
-
-    Args:
-        summary: Summary rows of one section.
-        rows: Its result rows.
-        verdict: Its verdict.
     """
     found = []
     for method in in_order(map(str, summary["method"])):

@@ -13,12 +13,7 @@ from merge_cosim.sweeps.plan import default_model
 
 
 def run_command(row: Mapping[Hashable, Any], manifest: Mapping[str, Any]) -> str:
-    """`merge-cosim run ...` with the settings that the row was made with.
-
-    Args:
-        row: A result row.
-        manifest: The manifest of its folder.
-    """
+    """`merge-cosim run ...` with the settings that the row was made with."""
     command = manifest["command"]
     files = {Path(spec).stem: spec for spec in command["scenarios"]}
     words = ["merge-cosim", "run", files.get(row["scenario"], row["scenario"]), "--case", row["case"]]

@@ -29,12 +29,9 @@ MOST_NUMBERS = 24
 
 
 def failure_map(results: pd.DataFrame) -> Figure:
-    """Share of failed cases by both initial speeds, one small map per method; speeds without a case stay blank.
+    """Share of failed cases of one scenario by both initial speeds, a map per method; without a case it stays blank.
 
     A dot marks speeds at which a host did not reach the merging point in time in at least one case.
-
-    Args:
-        results: Rows of one scenario.
     """
     shares = failure_shares(results)
     parts = {

@@ -48,10 +48,6 @@ def recorded_cases(traces: pd.DataFrame, results: pd.DataFrame) -> list[dict[str
     """Recorded cases with all their methods.
 
     Numbers are stored as whole multiples of their last digit, each as its difference from the cycle before.
-
-    Args:
-        traces: Their records, one row per cycle.
-        results: All result rows.
     """
     if traces.empty:
         return []

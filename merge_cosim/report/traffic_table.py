@@ -37,11 +37,7 @@ COLUMNS = (
 
 
 def traffic_table(rows: Sequence[dict[str, Any]]) -> Table | None:
-    """One row per scenario, variation and method; None where there were no scenes.
-
-    Args:
-        rows: The result folder's table of scenes.
-    """
+    """One row per scenario, variation and method; None where there were no scenes."""
     if not rows:
         return None
     frame = pd.DataFrame(rows).reindex(columns=[column.name for column in COLUMNS])

@@ -21,12 +21,7 @@ _CONTACT = (*_NAMES, "failed", "sumo_collision", "host_reached_s", "merging_reac
 
 
 def checked(run: Run, rows: pa.Table) -> Checked:
-    """The invariants of a run: how many encounters broke each.
-
-    Args:
-        run: The run.
-        rows: Its result rows.
-    """
+    """The invariants of a run: how many encounters broke each."""
     broken = {name: np.flatnonzero(where) for name, where in run.broken.items()}
     if run.world == "sumo" and not pc.all(pc.equal(rows["failed"], rows["sumo_collision"])).as_py():
         kinds = kinds_of_difference(rows.select(_CONTACT).to_pandas())

@@ -55,13 +55,7 @@ class Rows:
         return sorted({_group_of(file, number) for file, number in self.row_groups()})
 
     def batches(self, scenario: str, variation: str, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-        """The merged rows of one scenario and variation, in batches of whole cases.
-
-        Args:
-            scenario: The scenario.
-            variation: The variation.
-            columns: Columns to read beside `case`; None for all.
-        """
+        """The merged rows of one scenario and variation, in batches of whole cases; all columns, or `case` and some."""
         own = (one for one in self.row_groups() if _group_of(*one) == (scenario, variation))
         yield from self._in_whole_cases(own, columns)
 

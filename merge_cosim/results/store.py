@@ -86,11 +86,7 @@ class ResultFolder:
         self.parts.begin(plan)
 
     def reopen(self, plan: dict[str, Any], drop: str) -> None:
-        """Make ready for adding to a finished sweep: its rows and its facts of scenes become parts.
-
-        Args:
-            plan: The identity of the sweep with what is added.
-            drop: A method whose rows are left out, as they are made anew from the others.
+        """Make ready for adding to a finished sweep: its rows, without those of `drop`, and its scenes become parts.
 
         Raises:
             UserError: The folder holds no finished sweep, or something else was being done with it.
@@ -120,8 +116,7 @@ class ResultFolder:
     def merge(self, more: Callable[[pa.Table], pa.Table] | None = None) -> None:
         """Join all parts in the order of `KEY`, holding no more than some parts at a time; they stay until `finish`.
 
-        Args:
-            more: Makes further rows from the rows of a stretch of cases, of which it gets all methods.
+        `more` makes further rows from the rows of a stretch of cases, of which it gets all methods.
         """
         self.rows.write(_completed(rows, more) for rows in self.parts.stretches())
 

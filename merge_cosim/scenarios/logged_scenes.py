@@ -15,11 +15,6 @@ from merge_cosim.scenarios.sources import Pairs
 def load_scenes(scenario: Scenario, source: str, data: Path | None) -> dict[str, LoggedScene]:
     """Return the scenes of a replay's sites, by recording.
 
-    Args:
-        scenario: The scenario.
-        source: The source of its encounters, `ngsim` or `surrogate`.
-        data: Folder with NGSIM files, or with the surrogate's; None where the surrogate is asked for.
-
     Raises:
         UserError: A file is damaged.
     """

@@ -51,16 +51,7 @@ class Study:
 def reproduce(
     data: Path | None, out: Path, jobs: int, seed: int = 0, say: Say | None = None, world: WorldKind = "sumo"
 ) -> list[Study]:
-    """Train a model per source, run every study into a folder of its own, and return the studies.
-
-    Args:
-        data: Folder with NGSIM files, or None. The surrogate is run in any case.
-        out: Folder to write to.
-        jobs: Processes.
-        seed: Seed of SUMO and of every random stream.
-        say: Called with the work done, all work and what is being run.
-        world: What moves the cars.
-    """
+    """Train a model per source, run every study into a folder of its own, and return the studies."""
     found = studies(data, out, jobs, seed, say, world)
     run(found, out, say)
     return found

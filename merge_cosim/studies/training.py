@@ -33,16 +33,7 @@ def train(
     out: Path,
     everything: bool = False,
 ) -> dict[str, Any]:
-    """Fit a model on one third of a site's pairs, write it, and judge it on the rest.
-
-    Args:
-        site: Name of a shipped ramp, or a folder with `site.toml`.
-        data: Folder with recordings, or None.
-        source: Force real data or the surrogate.
-        split: What is kept together on one side.
-        seed: Seed of the split.
-        out: Model file (.json).
-        everything: Fit on all pairs instead; then there is no rest to judge it on.
+    """Fit a model on one third of a site's pairs, write it, and judge it on the rest; see `merge_cosim.train`.
 
     Raises:
         UserError: There are no such pairs, or too few of one intention.
@@ -81,17 +72,7 @@ def train_ensemble(
     splits: int = 0,
     folds: int = 0,
 ) -> list[dict[str, Any]]:
-    """Fit several models into a folder, so that what depends on the training cars can be seen.
-
-    Args:
-        site: See `train`.
-        data: See `train`.
-        source: See `train`.
-        seed: Seed of the first split, or of the folds.
-        out: Folder; `sweep --model FOLDER` runs each learned method with each of its models.
-        splits: Number of models, each fitted on another third of the merging cars.
-        folds: Instead, number of parts of the merging cars; each model is fitted on all parts but one (cross-fitting),
-            so that every pair is tested by the one model that has not seen its car.
+    """Fit several models into a folder, as `merge_cosim.train_ensemble` says.
 
     Returns:
         One row per model: file, pairs and cars.

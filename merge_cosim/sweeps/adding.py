@@ -68,10 +68,6 @@ def joined(before: Mapping[str, Any], new: dict[str, Any], against: str | None, 
 def missing(tasks: Sequence[Task], folder: ResultFolder) -> Iterator[Task]:
     """The parts of some tasks whose rows a reopened folder does not hold.
 
-    Args:
-        tasks: The tasks.
-        folder: The folder.
-
     Raises:
         UserError: A case of the same name has another initial state.
     """

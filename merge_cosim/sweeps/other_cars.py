@@ -22,11 +22,7 @@ USUAL_LENGTH = 5.0
 
 
 def other_cars(task: Task, case: str) -> pd.DataFrame | None:
-    """Where the other cars are in every cycle but the first.
-
-    Args:
-        task: The task of only this case.
-        case: Its name.
+    """Where the other cars are in every cycle but the first, by the task of only this case.
 
     Returns:
         As `read_floating_cars`, with `length_m`; None for a pair of cars, and where the traffic has several copies of

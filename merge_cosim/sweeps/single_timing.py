@@ -20,9 +20,6 @@ def time_single_cases(tasks: Sequence[Task]) -> dict[str, float]:
     """Time of one update in a batch of one [us], by method.
 
     Living traffic is left out: its encounters cannot be run one at a time.
-
-    Args:
-        tasks: What was run.
     """
     efforts: dict[str, Effort] = {}
     worker_session = WorkerSession(tiles=1)

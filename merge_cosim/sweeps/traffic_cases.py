@@ -32,11 +32,7 @@ _NOTHING = (Event.NO_HOST, Event.HOST_NOT_DEPARTED, Event.NO_MERGING, Event.NOT_
 
 
 def refuse_empty(facts: Facts, where: str) -> None:
-    """Refuse scenes of which none has a meeting, so that there is nothing to measure.
-
-    Args:
-        facts: The scenes' facts; none for pairs.
-        where: What error lines call them.
+    """Refuse scenes of which none has a meeting, so that there is nothing to measure. Pairs have no facts.
 
     Raises:
         UserError: There are scenes, and no meeting.

@@ -80,17 +80,7 @@ def verify(
     """Run a share of the rows of each scenario, variation and method again, at least one of each.
 
     Rows of the closed form and of SUMO are run in SUMO, `human` from the log; `oracle-best`, which is picked from
-    others, is left out. Of living traffic whole scenes are run.
-
-    Args:
-        folder: The result folder.
-        share: Share of the rows, above 0 and up to 1.
-        seed: Seed of the choice.
-        data: Folder with NGSIM files.
-        model: Model file or name; None for the one of the rows' name.
-        plugins: Files with the user's own components.
-        jobs: Processes.
-        tolerance: See `results.agreement.agreement`.
+    others, is left out. Of living traffic whole scenes are run. The arguments are those of `Results.verify`.
 
     Raises:
         UserError: The folder holds no finished sweep, or its scenarios, data or models are missing.

@@ -40,14 +40,10 @@ class LoggedOutcome:
 
 
 def replay_logged_host(encounters: Encounters, horizon: float = HORIZON) -> LoggedOutcome:
-    """Score the logged host of each encounter: from the first cycle with both stations >= 0 for `horizon` seconds.
+    """Score the logged host of each encounter: from the first cycle with both stations >= 0 for `horizon` [s].
 
     A log that ends in the host lane goes on at its last speed, as in any replay (`MIN_SPEED` at least, so that a car
     that stands in traffic is scored, too).
-
-    Args:
-        encounters: Encounters with a log.
-        horizon: Scored time [s].
     """
     log = encounters.log
     if log is None:

@@ -45,14 +45,7 @@ class Paired:
 
 
 def extract_pairs(table: pa.Table, site: Site, rules: PairRules, source: str) -> Paired:
-    """Pair the merging cars of a canonical trajectory table with their hosts; see `pair_tracks`.
-
-    Args:
-        table: Trajectories of `site`, sorted by recording, vehicle, part and frame.
-        site: Lanes and gore.
-        rules: The thresholds.
-        source: What the encounters name as their source.
-    """
+    """Pair the merging cars of a canonical table, sorted as the reader does, with their hosts; see `pair_tracks`."""
     return pair_tracks(carried_on(build_tracks(table, site, rules), cycles(rules.carry_on)), site, rules, source)
 
 

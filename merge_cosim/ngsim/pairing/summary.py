@@ -13,7 +13,7 @@ from merge_cosim.core.encounter import Intention
 from merge_cosim.core.errors import UserError
 from merge_cosim.core.units import DT
 from merge_cosim.ngsim.data import cached, episode_files
-from merge_cosim.ngsim.pairing.checks import HORIZON, replay_logged_host
+from merge_cosim.ngsim.pairing.checks import replay_logged_host
 from merge_cosim.ngsim.pairing.encounters import site_pairs
 from merge_cosim.ngsim.pairing.pairs import Paired
 from merge_cosim.ngsim.sites import Site, shipped_sites
@@ -78,19 +78,12 @@ class Summary:
         return {name: None if isinstance(value, float) and np.isnan(value) else value for name, value in values.items()}
 
 
-def summarise(paired: Paired, site: str, source: str = "ngsim", horizon: float = HORIZON) -> Summary:
-    """Compute a site's numbers.
-
-    Args:
-        paired: Its pairs, such as `encounters.site_pairs` returns.
-        site: Name of the site.
-        source: Their source.
-        horizon: Scored time [s].
-    """
+def summarise(paired: Paired, site: str, source: str = "ngsim") -> Summary:
+    """Compute a site's numbers."""
     e, log = paired.encounters, paired.encounters.log
     if log is None:
         raise ValueError("these encounters have no log")
-    outcome = replay_logged_host(e, horizon)
+    outcome = replay_logged_host(e)
     change = log.change_cycle
     rows = range(len(e))
     merging = np.array([log.merging_station[i][change[i]] for i in rows]) - e.merging_station
@@ -119,11 +112,7 @@ def summarise(paired: Paired, site: str, source: str = "ngsim", horizon: float =
 
 
 def summarise_folder(data: Path, sites: Sequence[Site] = ()) -> list[Summary]:
-    """Compute the numbers of every site that a data folder (or file) holds.
-
-    Args:
-        data: The folder or file.
-        sites: The sites to look for; the shipped ones if none is given.
+    """Compute the numbers of every site that a data folder (or file) holds; of the shipped ones, if none is given.
 
     Raises:
         UserError: It does not exist, a file is damaged, or there is nothing of these sites.

@@ -20,13 +20,6 @@ def start_ramp(
 ) -> tuple[Path, list[str]]:
     """Write a ramp into a new folder; also what was found in the file it was made from, a line each.
 
-    Args:
-        folder: Where to; its name is the ramp's.
-        numbers: Fields of `RampNumbers` that the user has given.
-        net: A SUMO net to take the ramp from.
-        extract: An extract of OpenStreetMap to take the ramp from.
-        link: An edge of the on-ramp in that file.
-
     Raises:
         UserError: The arguments contradict each other, or the ramp cannot be made.
     """

@@ -51,12 +51,7 @@ def not_compared(against: str | None) -> dict[str, Any]:
 
 
 def differing(own: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
-    """The common cases carried to the end by both on which one of two methods fails: `difference` (+1, -1), `cluster`.
-
-    Args:
-        own: Rows of one method, one per case.
-        other: Rows of the other.
-    """
+    """Common cases carried to the end by both in which one of two methods fails: `difference` (+1, -1), `cluster`."""
     pairs = own[~own["censored"]].merge(other[~other["censored"]], on="case", suffixes=("", "_other"))
     return disagreement(pairs["failed"].to_numpy(), pairs["failed_other"].to_numpy(), clusters_of(pairs).to_numpy())
 

@@ -21,9 +21,6 @@ def ensemble(summary: pd.DataFrame) -> pd.DataFrame:
 
     `models`; `n`, `failures` and `failure_pct` over all models together; `M_median`, `M_min` and `M_max` over models of
     each measure M.
-
-    Args:
-        summary: Rows of `summarise`, one per section, method and model.
     """
     found = []
     for key, rows in summary[summary["model"] != ""].groupby([*SECTION, "method"], sort=True):

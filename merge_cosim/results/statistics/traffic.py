@@ -15,11 +15,7 @@ MEANS = ("throughput_veh_h", "mean_speed", "time_loss_s", "cars")
 
 
 def scene_tables(scenes: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
-    """By file name: every scene's facts; one row per scenario, variation and method; and a row for every note.
-
-    Args:
-        scenes: Facts of the scenes, as stored with their rows.
-    """
+    """By file name: every scene's facts; one row per scenario, variation and method; and a row for every note."""
     notes = [
         {**{name: scene[name] for name in (*GROUP[:3], "scene")}, "event": event, "what": line}
         for scene in scenes

@@ -105,10 +105,6 @@ def verdict(summary: pd.DataFrame | Sequence[dict[str, Any]], rows: pd.DataFrame
 
     Of a sample the first method is compared with every other: by McNemar's exact test on the common cases, or, without
     them (no `rows`, living traffic), by Fisher's exact test; with Holm's correction for the number of methods.
-
-    Args:
-        summary: Its summary rows, one per method, without variations.
-        rows: Its result rows.
     """
     frame = pd.DataFrame(summary)
     frame = frame[~frame["method"].map(is_reference)] if len(frame) else frame

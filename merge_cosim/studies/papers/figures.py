@@ -45,10 +45,6 @@ def overlap_figure(data: Path, site: Site) -> Figure:
 
     The host is the one that the most merging cars change lane beside.
 
-    Args:
-        data: Folder with trajectories of the site.
-        site: The site.
-
     Raises:
         UserError: The folder has no merging car of the site.
     """

@@ -100,11 +100,6 @@ class Chapter:
 def write_reproduction(studies: Sequence[Study], out: Path, say: Say) -> Path:
     """Write `report.html` and `tables/` into the folder of a reproduction, and the report of each study.
 
-    Args:
-        studies: The finished studies.
-        out: Folder of the reproduction.
-        say: Called with the reports written, all reports, and what is being written.
-
     Returns:
         The page.
     """

@@ -43,12 +43,7 @@ METHOD = Column("method", "method")
 
 
 def data_sets(source: str, data: Path | None) -> Table:
-    """Features of the data sets (Dong, Dolan, Litkouhi 2017, Table I).
-
-    Args:
-        source: `ngsim` or `surrogate`.
-        data: Folder with NGSIM files; None for the surrogate.
-    """
+    """Features of the data sets (Dong, Dolan, Litkouhi 2017, Table I); without a data folder of the surrogate."""
     summaries = summarise_folder(data) if data else _surrogate_summaries()
     rows = [
         {
