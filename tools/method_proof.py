@@ -90,6 +90,7 @@ ERRORS = [("speed_sigma", 0.5), ("station_sigma", 1.0), ("delay", 0.3)]
 SENSING: list[dict[str, Any]] = [
     {f"sensing.{name}": size for name, size in some} for some in (*[[e] for e in ERRORS], ERRORS)
 ]
+LATE = [given for given in SENSING if "sensing.delay" in given]
 STUDIES = {
     "designed": Study(["designed-2"], RIVALS),
     "narrow": Study(["designed-2"], RIVALS, [NARROW]),
@@ -100,11 +101,10 @@ STUDIES = {
     "shifted-seeds": Study(["shifted"], ["interactive", "slot-time", "ipcb"], [{"encounters.seed": 5}]),
     "replay": Study(["us101-replay"], [*RIVALS, "human"], logged=True),
     "sensing": Study(["designed-3"], ["interactive", *OTHERS], SENSING),
-    "latency": Study(
-        ["designed-3"],
-        ["interactive"],
-        [given | {"interactive.latency": given["sensing.delay"]} for given in SENSING if "sensing.delay" in given],
+    "compensated": Study(
+        ["designed-3"], ["interactive", *OTHERS], [given | {"sensing.compensated": True} for given in LATE]
     ),
+    "unstamped": Study(["designed-3"], ["interactive"], [given | {"sensing.stamped": False} for given in LATE]),
     "planners": Study(["designed-3"], ["interactive", *PLANNERS, "oracle-label+rollout"]),
     "ablations": Study(["designed-3"], ["interactive"], ABLATIONS),
     "front": Study(["designed-3"], ["interactive"], FRONT),

@@ -58,9 +58,10 @@ class Rollout(ReactingDriver, Acc):
     unless another is cheaper by `commitment`. The command changes by at most `max_jerk * dt` a cycle, but for the two
     hardest policies and for escapes.
 
-    An escape is full braking or full acceleration that avoids an overlap whatever a driver within bounds does. Where
-    the chosen policy's overlap has the probability `tolerated_risk` or more, the command is the nearest one that leaves
-    an escape for the next cycle. Where none exists within the bounds `-escape_braking` to `escape_acceleration`, they
+    An escape is full braking or full acceleration that avoids an overlap whatever a driver within bounds does. The risk
+    is the probability of an overlap under the chosen policy, or what is left of an earlier one: it falls by `exp(-dt /
+    risk_memory)` a cycle at most. Where it is `tolerated_risk` or more, the command is the nearest one that leaves an
+    escape for the next cycle. Where none exists within the bounds `-escape_braking` to `escape_acceleration`, they
     are narrowed in `escape_grades` steps around what the driver is expected to do now, until one does; where none does
     even so, the policy is chosen with the cost `last_overlap` of an overlap. A driver who stands at the merging point
     beside the host is taken to wait until the host has passed. With `tolerated_risk=0` it is not, and an escape from
@@ -89,7 +90,8 @@ class Rollout(ReactingDriver, Acc):
         commitment: How much cheaper another policy must be to be taken.
         max_jerk: Largest change of the command but for an escape [m/s^3].
         escape: Keep an escape.
-        tolerated_risk: Least probability of an overlap for which an escape is kept; 0: always.
+        tolerated_risk: Least risk of an overlap for which an escape is kept; 0: always.
+        risk_memory: Time constant with which a risk is forgotten [s], for a belief that has just changed may again.
         escape_braking: A driver's hardest braking as the escape allows for [m/s^2].
         escape_acceleration: A driver's hardest acceleration as the escape allows for [m/s^2].
         follower_braking: Braking that a driver behind the host is sure to have [m/s^2].
@@ -109,7 +111,7 @@ class Rollout(ReactingDriver, Acc):
     step: PositiveFloat = 0.25
     goal: PositiveFloat = 50.0
     scored: PositiveFloat = 3.0
-    overlap: NonNegativeFloat = 8.0
+    overlap: NonNegativeFloat = 7.0
     spread: PositiveFloat = 0.5
     spread_rate: NonNegativeFloat = 0.5
     progress: NonNegativeFloat = 1.0
@@ -119,7 +121,8 @@ class Rollout(ReactingDriver, Acc):
     commitment: NonNegativeFloat = 0.5
     max_jerk: PositiveFloat = 4.0
     escape: bool = True
-    tolerated_risk: Share = 0.01
+    tolerated_risk: Share = 0.03
+    risk_memory: NonNegativeFloat = 0.3
     escape_braking: NonNegativeFloat = 4.0
     escape_acceleration: Acceleration = 3.0
     follower_braking: PositiveFloat = 3.0
@@ -195,7 +198,8 @@ class Rollout(ReactingDriver, Acc):
         self._last = np.full(count, np.nan)
         self.last_policy = np.full(count, -1)
         self.last_belief = np.zeros((count, len(DRIVER_TYPES)))
-        self.risk = np.zeros(count)
+        self.risk, self._recent_risk = np.zeros((2, count))
+        self._risk_kept = float(np.exp(-setting.dt / max(self.risk_memory, 1e-9)))
         self._plans = np.zeros(count, dtype=bool)
         self.escape_status = np.zeros(count, dtype=np.int64)
         self._centre, self._in_lane = np.zeros((2, count))
@@ -204,6 +208,7 @@ class Rollout(ReactingDriver, Acc):
     def reset(self, rows: IntArray) -> None:
         """Forget the last commands and policies at `rows`."""
         self._last[rows] = np.nan
+        self._recent_risk[rows] = 0.0
         self.last_policy[rows] = -1
         self._in_lane[rows] = 0.0
 
@@ -240,7 +245,8 @@ class Rollout(ReactingDriver, Acc):
         self._guard = self._shares, self._centre, self._in_lane
         self._in_lane = np.where(plans, 0.0, self._in_lane + self.setting.dt)
         if self.escape:
-            guarded = ~plans | (self.risk >= self.tolerated_risk)
+            self._recent_risk = np.maximum(self.risk, self._recent_risk * self._risk_kept)
+            guarded = ~plans | (self._recent_risk >= self.tolerated_risk)
             constrain(state, guarded, *self._guard, _LEVELS, self._bounds, command, self.escape_status)
             lost = plans & (self.escape_status == NONE)
             if np.count_nonzero(lost):

@@ -19,10 +19,14 @@ class Setting:
     Attributes:
         speed_limit: Speed limit [m/s].
         dt: Length of a cycle [s].
+        latency: Age [s] of what the host observes, as the time stamps of its sensor tell; None without time stamps.
+        compensated: The observed station was moved on by the latency at the observed speed.
     """
 
     speed_limit: float = 29.0
     dt: float = DT
+    latency: float | None = 0.0
+    compensated: bool = False
 
 
 @dataclass(frozen=True)

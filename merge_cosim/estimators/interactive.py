@@ -36,8 +36,8 @@ class Interactive(ReactingDriver, Estimator):
     sensor is exact. `x_t - x_{t-1} - dt v_t` is 0 for exact reports and changes slowly for a speed that was smoothed.
     Where it changes from cycle to cycle like white noise, the noise of station and speed is estimated
     (`compiled.observer`), a Kalman filter with a randomly changing acceleration takes over, the filter over types
-    begins anew, and the acceleration's variance is added to `sigma^2`. The age of reports cannot be told from them; a
-    known one is `latency`.
+    begins anew, and the acceleration's variance is added to `sigma^2`. Where reports carry a time stamp, the state is
+    moved on by their age at the present acceleration.
 
     So a steady difference, which the noise explains, weighs little, and a sudden one much. A driver begins to act at
     the rate `1 / reaction_time`, and draws its type anew at `change_rate`.
@@ -59,8 +59,7 @@ class Interactive(ReactingDriver, Estimator):
         farthest_start: Longest way to the merging point at which `late` begins to accelerate [m].
         exact: Changes of the reported motion's residual up to which a sensor is taken to be exact [m].
         driver_jerk: Change of an acceleration in a cycle, one standard deviation, per length of the cycle [m/s^3].
-        latency: Known age of what the sensor reports [s]; the state is moved on by it at the present acceleration.
-        unknown_age: Age that reports of a sensor that is not exact may have besides [s], which escapes allow for.
+        unknown_age: Age that reports without a time stamp may have where they are not exact [s]; escapes allow for it.
     """
 
     name: ClassVar[str] = "interactive"
@@ -83,7 +82,6 @@ class Interactive(ReactingDriver, Estimator):
     farthest_start: NonNegativeFloat = 50.0
     exact: PositiveFloat = 0.01
     driver_jerk: PositiveFloat = 2.0
-    latency: NonNegativeFloat = 0.0
     unknown_age: NonNegativeFloat = 0.2
 
     def start(self, count: int, setting: Setting) -> None:
@@ -117,8 +115,14 @@ class Interactive(ReactingDriver, Estimator):
         self._off = np.zeros((count, 2, len(self._kinds)))
         self._roughness = np.zeros((count, self.roughness_levels))
         self._age = np.zeros(count, dtype=np.int64)
-        ages = self.latency, self.unknown_age
-        self._observer_law = ObserverLaw(self.exact, self.driver_jerk * setting.dt, *ages, setting.dt)
+        self._observer_law = ObserverLaw(
+            self.exact,
+            self.driver_jerk * setting.dt,
+            setting.latency or 0.0,
+            setting.compensated,
+            self.unknown_age if setting.latency is None else 0.0,
+            setting.dt,
+        )
         self._reports = np.zeros((count, MEMORY))
         self._station, self._speed, self._acceleration = np.zeros((3, count))
         self.deviation, self.late = np.zeros((3, count)), np.zeros(count)

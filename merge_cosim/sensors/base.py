@@ -22,6 +22,10 @@ class Sensor(Component):
         """Make room for a batch of `count` encounters and forget everything before."""
         self.setting = setting
 
+    def declared(self, setting: Setting) -> Setting:
+        """The setting that methods are given: with the age of the reports, where they carry time stamps."""
+        return setting
+
     def reset(self, rows: IntArray, keys: Keys) -> None:
         """Forget the encounters at `rows` of the batch; new ones begin there.
 

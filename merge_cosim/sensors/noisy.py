@@ -25,6 +25,7 @@ class Noisy(Sensor):
 
     Attributes:
         delay: Age of what is observed [s], in whole cycles.
+        stamped: Reports carry a time stamp, so a method may know how old they are.
         compensated: The station is moved on by the delay at the observed speed, as a host can that knows the delay.
         station_bias: Added to the station [m].
         speed_bias: Added to the speed [m/s].
@@ -41,6 +42,7 @@ class Noisy(Sensor):
 
     name: ClassVar[str] = "noisy"
     delay: Annotated[float, Field(ge=0, le=10)] = 0.0
+    stamped: bool = True
     compensated: bool = False
     station_bias: float = 0.0
     speed_bias: float = 0.0
@@ -66,6 +68,11 @@ class Noisy(Sensor):
         self._noise, self._report = np.zeros((2, 2, count))
         self._is_lost = np.zeros(count, dtype=bool)
         self._noise_keys, self._dropout_keys = np.zeros((2, count), dtype=np.uint64)
+
+    def declared(self, setting: Setting) -> Setting:
+        """With the delay, if reports are stamped, and whether it is compensated."""
+        latency = self._lag * setting.dt if self.stamped else None
+        return replace(setting, latency=latency, compensated=self.compensated)
 
     def reset(self, rows: IntArray, keys: Keys) -> None:
         """Begin the errors of the encounters at `rows`."""

@@ -33,9 +33,10 @@ class HostDriver:
     def start(self, count: int, setting: Setting) -> None:
         """Make room for a batch of `count` encounters."""
         self.sensor.start(count, setting)
+        declared = self.sensor.declared(setting)
         self.controller.pair(self.estimator)
-        self.estimator.start(count, setting)
-        self.controller.start(count, setting)
+        self.estimator.start(count, declared)
+        self.controller.start(count, declared)
 
     def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
         """Forget the encounters at `rows`; see `Estimator.reset`."""

@@ -254,6 +254,15 @@ def test_a_small_risk_is_tolerated():
     assert guarded(planner(tolerated_risk=0.0), state).escape_status[0] != UNSEEN
 
 
+def test_a_risk_is_forgotten_with_its_time_constant():
+    for memory, forgotten in ((0.0, 1), (0.3, 7)):  # 8 exp(-0.1 k / 0.3) is below 1 from k = 7 on
+        made = guarded(planner(risk_memory=memory), (-60, 18, -58, 17))
+        made.tolerated_risk = made.risk[0] / 8.0
+        looked = [guarded(made, (-60, 25, -58, 0)).escape_status[0] != UNSEEN for _ in range(9)]
+        assert made.risk[0] < made.tolerated_risk
+        assert looked == [cycle < forgotten for cycle in range(1, 10)]
+
+
 stations, speeds = st.floats(-90, -1), st.floats(0, 28)
 accelerations = st.lists(st.floats(-4, 3), min_size=30, max_size=30)
 

@@ -17,13 +17,15 @@ from merge_cosim.estimators.compiled.observer import (
 
 DT = 0.1
 
+DEFAULTS = {"exact": 0.01, "change": 0.2, "latency": 0.0, "compensated": False, "unknown": 0.2, "dt": DT}
+
 
 def observed(station, speed, **law):
     """Stations, speeds, accelerations, deviations and memory of one car over all cycles."""
     memory, age = np.zeros((1, MEMORY)), np.ones(1, np.int64)
     state = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((3, 1)), np.zeros(1)
     rows, deviations = [], []
-    fixed = ObserverLaw(**{"exact": 0.01, "change": 0.2, "latency": 0.0, "unknown": 0.2, "dt": DT} | law)
+    fixed = ObserverLaw(**DEFAULTS | law)
     for x, v in zip(station, speed, strict=True):
         observe(np.array([x]), np.array([v]), fixed, memory, *state, age)
         rows.append([one[0] for one in state[:3]])
@@ -99,3 +101,6 @@ def test_a_known_latency_moves_the_state_on():
     (x, v, _), _, _, _ = observed(station, speed, latency=0.3)
     assert v[-1] == pytest.approx(speed[-1] - 0.6)
     assert x[-1] == pytest.approx(station[-1] + 0.3 * (speed[-1] - 0.3))
+    (moved, same, _), _, _, _ = observed(station + 0.3 * speed, speed, latency=0.3, compensated=True)
+    assert moved == pytest.approx(x)
+    assert same == pytest.approx(v)

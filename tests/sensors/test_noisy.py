@@ -51,6 +51,13 @@ def test_a_delayed_state_is_as_old_as_it_should_be():
     assert {s.host_station[0] for s in seen} == {-50.0}  # the host knows its own state
 
 
+def test_time_stamps_tell_methods_the_delay_in_whole_cycles():
+    assert begun(Noisy(delay=0.32)).declared(Setting()).latency == pytest.approx(0.3)
+    assert begun(Noisy(delay=0.3, stamped=False)).declared(Setting()).latency is None
+    assert begun(Coarse(compensated=True)).declared(Setting(20.0)) == Setting(20.0, latency=pytest.approx(0.3), compensated=True)
+    assert Perfect().declared(Setting()) == Setting()
+
+
 def test_a_known_delay_is_made_up_for_at_the_observed_speed():
     sensor = begun(Noisy(delay=0.2, compensated=True))
     states = [(-50.0, 10.0), (-49.0, 10.0), (-47.8, 12.0), (-46.4, 14.0), (-44.8, 16.0)]

@@ -33,6 +33,7 @@ class ObserverLaw(NamedTuple):
     exact: float
     change: float
     latency: float
+    compensated: bool
     unknown: float
     dt: float
 
@@ -115,6 +116,8 @@ def observe(
     for row in range(station.shape[0]):
         own = memory[row]
         x, v = station[row], speed[row]
+        if law.compensated:
+            x -= law.latency * v
         seen_station[row], seen_speed[row] = x, v
         acceleration[row] = np.nan
         late[row] = 0.0
