@@ -72,17 +72,18 @@ ABLATIONS: list[dict[str, Any]] = [
     {"rollout.commitment": 0.0},
     {"rollout.escape": False},
     {"rollout.tolerated_risk": 0.0},
+    {"rollout.risk_memory": 0.0},
     {"rollout.overlap": 1000.0},
     {"rollout.spread_rate": 0.0},
     {"rollout.escape_grades": 1},
-    {"rollout.last_overlap": 8.0},
+    {"rollout.last_overlap": 7.0},
 ]
 STRICT: dict[str, Any] = {"rollout.tolerated_risk": 0.0}
 FASTEST = STRICT | {f"rollout.{cost}": 0.0 for cost in ("overlap", "last_overlap", "effort", "sudden", "commitment")}
 """Only the time to the goal has a cost: what keeping the escape takes by itself."""
 FRONT: list[dict[str, Any]] = [
     STRICT,
-    *({"rollout.tolerated_risk": risk} for risk in (0.001, 0.01, 0.02, 0.1, 1.0)),
+    *({"rollout.tolerated_risk": risk} for risk in (0.003, 0.01, 0.03, 0.1, 1.0)),
     STRICT | {"rollout.escape_braking": 3.0, "rollout.escape_acceleration": 2.0},
     FASTEST,
 ]
@@ -96,7 +97,7 @@ STUDIES = {
     "narrow": Study(["designed-2"], RIVALS, [NARROW]),
     "designed-1": Study(["designed-1"], RIVALS, logged=True),
     "hidden": Study(["designed-3"], [*RIVALS, "oracle-label", "always-go", "always-yield", "oracle-best"]),
-    "seeds": Study(["designed-3"], ["interactive"], [dict.fromkeys(SEED, seed) for seed in range(5, 10)]),
+    "seeds": Study(["designed-3"], ["interactive"], [dict.fromkeys(SEED, seed) for seed in range(1, 10)]),
     "shifted": Study(["shifted"], ["interactive", *OTHERS]),
     "shifted-seeds": Study(["shifted"], ["interactive", "slot-time", "ipcb"], [{"encounters.seed": 5}]),
     "replay": Study(["us101-replay"], [*RIVALS, "human"], logged=True),
