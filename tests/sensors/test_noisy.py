@@ -54,7 +54,9 @@ def test_a_delayed_state_is_as_old_as_it_should_be():
 def test_time_stamps_tell_methods_the_delay_in_whole_cycles():
     assert begun(Noisy(delay=0.32)).declared(Setting()).latency == pytest.approx(0.3)
     assert begun(Noisy(delay=0.3, stamped=False)).declared(Setting()).latency is None
-    assert begun(Coarse(compensated=True)).declared(Setting(20.0)) == Setting(20.0, latency=pytest.approx(0.3), compensated=True)
+    assert begun(Coarse(compensated=True)).declared(Setting(20.0)) == Setting(
+        20.0, latency=pytest.approx(0.3), compensated=True
+    )
     assert Perfect().declared(Setting()) == Setting()
 
 
