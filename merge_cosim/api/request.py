@@ -57,7 +57,7 @@ def request_of(
         model=str(model) if isinstance(model, Path) else model,
         settings=dict(settings or {}),
         variations=[(name, list(values)) for name, values in (vary or {}).items()],
-        data=find_data(None if data is None else Path(data)),
+        data=find_data(data),
         source=source,
         seed=seed,
         plugins=[Path(plugin) for plugin in plugins],

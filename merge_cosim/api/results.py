@@ -221,7 +221,7 @@ class Results:
             self.path,
             share,
             seed,
-            find_data(None if data is None else Path(data)),
+            find_data(data),
             None if model is None else str(model),
             [Path(plugin) for plugin in plugins],
             jobs or os.cpu_count() or 1,
@@ -311,17 +311,21 @@ class Results:
 
 def _constant_part(condition: str) -> bool:
     """Whether something without a column in it is negated or compared, which pandas takes for a number's bits."""
-    try:
-        parts = list(ast.walk(ast.parse(condition.strip(), mode="eval")))
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return False  # pandas raises its own error
     pieces: list[list[ast.expr]] = []
-    for one in parts:
+    for one in _parsed(condition) or ():  # else pandas raises its own error
         if isinstance(one, ast.UnaryOp) and isinstance(one.op, ast.Not | ast.Invert):
             pieces.append([one.operand])
         elif isinstance(one, ast.Compare):
             pieces += map(list, pairwise([one.left, *one.comparators]))
     return not all(any(_is_column(part) for one in piece for part in ast.walk(one)) for piece in pieces)
+
+
+def _parsed(condition: str) -> list[ast.AST] | None:
+    """All parts of a condition; None where it is not Python's syntax."""
+    try:
+        return list(ast.walk(ast.parse(condition.strip(), mode="eval")))
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None
 
 
 def _is_column(part: ast.AST) -> bool:
@@ -331,10 +335,10 @@ def _is_column(part: ast.AST) -> bool:
 
 def _columns_in(condition: str) -> list[str]:
     """The columns that a condition names; all, where it is not Python's syntax, which pandas extends."""
-    try:
-        names = {part.id for part in ast.walk(ast.parse(condition.strip(), mode="eval")) if isinstance(part, ast.Name)}
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
+    parts = _parsed(condition)
+    if parts is None:
         return list(SCHEMA.names)
+    names = {part.id for part in parts if isinstance(part, ast.Name)}
     return [name for name in SCHEMA.names if name in names] or ["case"]
 
 

@@ -85,7 +85,7 @@ def train(
     """
     from merge_cosim.studies.training import train as train_model
 
-    folder = find_data(None if data is None else Path(data))
+    folder = find_data(data)
     report = train_model(str(site), folder, source, split, seed, Path(out), everything)
     return Training(IntentionModel.load(out), Path(out), report)
 
@@ -124,7 +124,7 @@ def train_ensemble(
     """
     from merge_cosim.studies.training import train_ensemble as train_models
 
-    folder = find_data(None if data is None else Path(data))
+    folder = find_data(data)
     return pd.DataFrame(train_models(str(site), folder, source, seed, Path(out), splits, folds))
 
 
@@ -151,7 +151,7 @@ def bounds(
     """
     from merge_cosim.studies.bounds import bounds_of
 
-    folder = find_data(None if data is None else Path(data))
+    folder = find_data(data)
     cases, counts = bounds_of(str(scenario), dict(settings or {}), folder, source)
     return cases, pd.DataFrame(counts)
 
@@ -229,7 +229,7 @@ def reproduce(
     from merge_cosim.studies.reproduction import reproduce as run_studies
 
     refuse_file(Path(out))
-    folder = find_data(None if data is None else Path(data))
+    folder = find_data(data)
     with sweep_progress(progress) as report:
         studies = run_studies(folder, Path(out), jobs or os.cpu_count() or 1, seed, report, world)
         page = write_reproduction(studies, Path(out), report)

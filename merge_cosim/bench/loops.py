@@ -123,17 +123,13 @@ def _described(task: Task) -> dict[str, Any]:
 
 
 def _run_script(script: str, task: Path) -> Timing:
-    found = _json_of(script, str(task))
-    steps = found["vehicle_steps"]
-    return Timing(1e6 * found["wall_s"] / steps, 1e6 * found["cpu_s"] / steps, tuple(found["failed"]))
-
-
-def _json_of(script: str, *arguments: str) -> Any:
     """Run a script of `tools/bench` in a process of its own, as libsumo holds one simulation per process."""
     file = shipped("tools/bench") / script
     if not file.is_file():
         raise UserError(f"{file}: missing; it comes with the source and with the wheel of merge-cosim")
-    return run_json([sys.executable, str(file), *arguments])
+    found = run_json([sys.executable, str(file), str(task)])
+    steps = found["vehicle_steps"]
+    return Timing(1e6 * found["wall_s"] / steps, 1e6 * found["cpu_s"] / steps, tuple(found["failed"]))
 
 
 def run_json(command: Sequence[str]) -> Any:

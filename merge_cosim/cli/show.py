@@ -53,13 +53,10 @@ def show_verification(found: Verification, only_beyond: bool = False) -> None:
     """Print what came out of running rows again, with the columns that differ, or only those beyond the tolerance."""
     rows = verification(found)["differences"]
     if rows and (found.beyond or not only_beyond):
-        show_table([{str(name): _exact(value) for name, value in row.items()} for row in rows], "what differs")
+        exact = [{k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows]
+        show_table(exact, "what differs")
     for line in (*found.notes, str(found)):
         print(line)
-
-
-def _exact(value: Any) -> Any:
-    return f"{value:.6g}" if isinstance(value, float) else value
 
 
 def show_table(rows: Sequence[Mapping[str, Any]], title: str) -> None:

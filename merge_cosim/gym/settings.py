@@ -105,7 +105,7 @@ class Options:
             scenarios=[scenario],
             methods=["acc"],
             settings=dict(self.settings),
-            data=find_data(None if self.data is None else Path(self.data)),
+            data=find_data(self.data),
             source=self.source,
             world=self.world,
         )

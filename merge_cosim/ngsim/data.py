@@ -44,20 +44,17 @@ class DataFile:
     note: str = ""
 
 
-def find_data(option: Path | None) -> Path | None:
+def find_data(option: str | Path | None) -> Path | None:
     """Return the data folder (or file): the option, else `$MERGE_COSIM_DATA`, else `./data` unless empty, else None.
 
     Raises:
         UserError: What the option or the variable names does not exist.
     """
-    if option is not None:
-        if not option.exists():
-            raise UserError(f"{option}: no such folder (from --data)")
-        return option
-    if named := os.environ.get(ENVIRONMENT):
-        if not Path(named).exists():
-            raise UserError(f"{named}: no such folder (from ${ENVIRONMENT})")
-        return Path(named)
+    for named, where in ((option, "--data"), (os.environ.get(ENVIRONMENT) or None, f"${ENVIRONMENT}")):
+        if named is not None:
+            if not Path(named).exists():
+                raise UserError(f"{named}: no such folder (from {where})")
+            return Path(named)
     usual = Path("data")
     return usual if usual.is_dir() and any(usual.iterdir()) else None
 

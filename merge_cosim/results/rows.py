@@ -42,7 +42,7 @@ def result_rows(
     labelled = encounters.label >= 0
     decided = c["last_decision"] >= 0
     correct = labelled & decided & (c["last_decision"] == encounters.label)
-    host_first = _earlier(c["host_reached_s"], c["merging_reached_s"])
+    host_first = c["host_reached_s"] < np.nan_to_num(c["merging_reached_s"], nan=np.inf)
     order_known = ~(np.isnan(c["host_reached_s"]) & np.isnan(c["merging_reached_s"]))
     if encounters.log is None:
         last_logged = np.full(n, NEVER)
@@ -145,10 +145,6 @@ def _supported(model: IntentionModel | None, encounters: Encounters) -> pa.Array
     merging = time_to_arrival(encounters.merging_station, encounters.merging_speed)
     host = time_to_arrival(encounters.host_station, encounters.host_speed)
     return pa.array(model.arrivals.supports(merging, host))
-
-
-def _earlier(first: FloatArray, second: FloatArray) -> BoolArray:
-    return np.nan_to_num(first, nan=np.inf) < np.nan_to_num(second, nan=np.inf)
 
 
 def post_encroachment(c: Mapping[str, AnyArray], encounters: Encounters, dt: float) -> FloatArray:

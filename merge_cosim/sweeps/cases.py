@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -27,8 +28,7 @@ from merge_cosim.simulation.worlds.logged_host import LoggedHostWorld
 from merge_cosim.simulation.worlds.logged_rules import FullScene
 from merge_cosim.simulation.worlds.tiles import TiledWorld
 from merge_cosim.sumo.attach import Address, AttachedSession
-from merge_cosim.sumo.options import SumoOptions, delay_option
-from merge_cosim.sumo.session import Session
+from merge_cosim.sumo.options import delay_option
 from merge_cosim.sumo.start import TraciSession
 from merge_cosim.sumo.tiles import tile_id
 from merge_cosim.sweeps.worker_session import WorkerSession
@@ -232,14 +232,10 @@ def _single_world(ramp: Ramp, seed: int, options: RunOptions, host: Way) -> Tile
     if options.gui_delay is None:
         return TiledWorld(ramp, 1, seed, extra=options.extra, host=host)
     shown = (*view_options(ramp.net.parent), *delay_option(options.gui_delay))
-    world = TiledWorld(ramp, 1, seed, _open_window, (*shown, *options.extra), host=host)
+    world = TiledWorld(ramp, 1, seed, partial(TraciSession, gui=True), (*shown, *options.extra), host=host)
     world.session.follow(tile_id(0, "host"))
     world.shown = True
     return world
-
-
-def _open_window(options: SumoOptions) -> Session:
-    return TraciSession(options, gui=True)
 
 
 @dataclass(frozen=True)

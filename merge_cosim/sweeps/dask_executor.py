@@ -82,7 +82,8 @@ class Cluster:
                 while len(running) < 2 * max(1, len(client.nthreads())) and (chunk := queue.take()):
                     ramp = chunk.whole.scenario.ramp
                     if ramp not in worker_files_of:
-                        worker_files_of[ramp] = self._worker_files(ramp)
+                        name = find_ramp(ramp).resolve().name
+                        worker_files_of[ramp] = WorkerFiles(software(), ramp_files(ramp), name, self._plugins)
                     key = f"merge-cosim-{session}-{chunk.name}"
                     future = client.submit(run_shipped, pack(chunk.task()), worker_files_of[ramp], key=key, pure=False)
                     running[future] = chunk
@@ -133,9 +134,6 @@ class Cluster:
             if isinstance(theirs, BaseException):
                 raise UserError(f"--dask {self._address}: worker {worker} cannot run merge-cosim: {theirs!r}")
             _compare(theirs, software(), f"worker {worker}")
-
-    def _worker_files(self, ramp: str) -> WorkerFiles:
-        return WorkerFiles(software(), ramp_files(ramp), find_ramp(ramp).resolve().name, self._plugins)
 
     def _result(self, future: Any, chunk: Chunk) -> tuple[pa.Table, Effort]:
         try:

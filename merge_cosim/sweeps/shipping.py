@@ -36,7 +36,8 @@ def own_classes(task: Task) -> list[type[Component]]:
     named = ((merging_cars, scenario.merging.get("model")), (sensors, scenario.sensing.get("model")))
     others: list[type[Component]] = [registry[str(model)] for registry, model in named if str(model) in registry]
     classes = [*task.method.classes(), *others]
-    return [cls for cls in classes if not _is_of_this_package(cls.__module__)]
+    package = __package__.partition(".")[0]
+    return [cls for cls in classes if cls.__module__.partition(".")[0] != package]
 
 
 def sources(tasks: Sequence[Task]) -> dict[str, str]:
@@ -98,10 +99,6 @@ def main_hidden() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = main
-
-
-def _is_of_this_package(module: str) -> bool:
-    return module.partition(".")[0] == __package__.partition(".")[0]
 
 
 def _lies_beside(module: str) -> bool:

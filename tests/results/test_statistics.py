@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import expit
 from scipy.stats import bootstrap
-from test_summaries import frame
+from test_summaries import frame, strata, summarise
 
 from merge_cosim.core.errors import UserError
-from merge_cosim.results.statistics import belief, calibration, strata, summarise
+from merge_cosim.results.statistics import belief, calibration
 from merge_cosim.results.statistics.belief import scores
 from merge_cosim.results.statistics.comparison import reference_of
 from merge_cosim.results.statistics.paired import mean_difference, sign_flip_p

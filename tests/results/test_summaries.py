@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 
 from merge_cosim.results.schema import SCHEMA
-from merge_cosim.results.statistics import Summary, oracle_best, rates, summarise, totals
+from merge_cosim.results.statistics import Summary, oracle_best, rates, totals
 from merge_cosim.results.statistics.summary import COLUMNS
 
 BASE = dict.fromkeys(SCHEMA.names) | {
@@ -49,6 +49,14 @@ def frame(*rows):
     """Result rows as pandas reads them from a sweep's file."""
     table = pa.Table.from_pandas(pd.DataFrame([BASE | row for row in rows]), schema=SCHEMA, preserve_index=False)
     return table.to_pandas()
+
+
+def summarise(rows, cycle_us, against=None):
+    return Summary(len(rows), against).add(rows).table(cycle_us)
+
+
+def strata(rows):
+    return Summary(len(rows), None).add(rows).strata()
 
 
 def test_rates_and_bounds():

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import fisher_exact
+from test_summaries import strata, summarise
 
 from merge_cosim.results.schema import SCHEMA
-from merge_cosim.results.statistics import strata, summarise
 from merge_cosim.results.statistics.rates import percent, wilson
 from merge_cosim.results.statistics.summary import MEANS, QUANTILES, is_sample, is_sample_source, with_all_sites
 from merge_cosim.results.statistics.verdict import verdict, verdicts

@@ -59,8 +59,9 @@ def site_pairs(
     """
     rules = (rules or PairRules()).over(site.pairs)
     source = source or site.source
-    choices = (repr(site), source, repr(rules), str(COMPLETE_CARS))
-    key = "|".join([*_identity(data), *choices, *_versions()])
+    versions = merge_cosim.__version__, str(READER_VERSION), str(PAIRS_VERSION)
+    choices = (repr(site), source, repr(rules), str(COMPLETE_CARS), *versions)
+    key = "|".join([*_identity(data), *choices])
     cached = cache_folder("encounters") / f"{site.name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.parquet"
     if is_whole(cached):
         return read_pairs(cached)
@@ -138,10 +139,6 @@ def _identity(data: Path) -> Iterator[str]:
         if path.is_file():
             state = path.stat()
             yield f"{path.resolve()}:{state.st_size}:{state.st_mtime_ns}"
-
-
-def _versions() -> tuple[str, ...]:
-    return merge_cosim.__version__, str(READER_VERSION), str(PAIRS_VERSION)
 
 
 def _shifted(stations: Ragged, shift: np.ndarray) -> Ragged:

@@ -3,12 +3,12 @@
 import json
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from merge_cosim.core.encounter import Encounters, Ragged, ReplayLog
-from merge_cosim.core.units import IntArray
 from merge_cosim.ngsim.pairing.pairs import Paired
 
 _FACTS = b"merge_cosim"
@@ -37,18 +37,12 @@ def read_pairs(path: Path) -> Paired:
     table = pq.read_table(path)
     facts = json.loads(table.schema.metadata[_FACTS])
     lists = {name: table[f"log.{name}"].combine_chunks() for name in _TRACKS}
-    tracks = {name: Ragged(each.flatten().to_numpy(), each.offsets.to_numpy()) for name, each in lists.items()}
-    cycles: dict[str, IntArray] = {name: table[name].to_numpy() for name in _CYCLES}
-    log = ReplayLog(
-        merging_station=tracks["merging_station"],
-        merging_speed=tracks["merging_speed"],
-        host_station=tracks["host_station"],
-        change_cycle=cycles["change_cycle"],
-        score_until=cycles["score_until"],
-        host_speed=tracks["host_speed"],
-    )
+    log: dict[str, Any] = {
+        name: Ragged(each.flatten().to_numpy(), each.offsets.to_numpy()) for name, each in lists.items()
+    }
+    log |= {name: table[name].to_numpy() for name in _CYCLES}
     return Paired(
-        Encounters(**{name: table[name].to_numpy() for name in _COLUMNS}, log=log),
+        Encounters(**{name: table[name].to_numpy() for name in _COLUMNS}, log=ReplayLog(**log)),
         facts["merging_cars"],
         {reason: tuple(names) for reason, names in facts["rejected"].items()},
     )

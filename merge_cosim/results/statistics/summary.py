@@ -75,26 +75,6 @@ def oracle_best(rows: pa.Table) -> pa.Table:
     return pa.Table.from_pandas(best, schema=SCHEMA, preserve_index=False)
 
 
-def summarise(
-    rows: pd.DataFrame, cycle_us: Mapping[str, tuple[float, float | None]], against: str | None = None
-) -> pd.DataFrame:
-    """One row per (scenario, variation, site, source, method), sorted by them.
-
-    A scenario with several sites also gets a row over all of them where they have the same source (site `all`).
-
-    Args:
-        rows: Result rows, as pandas reads them.
-        cycle_us: For each method the time of one update per encounter in a full batch, and in a batch of one [us].
-        against: Method that the others are compared with on the same cases; None for none.
-    """
-    return Summary(len(rows), against).add(rows).table(cycle_us)
-
-
-def strata(rows: pd.DataFrame, against: str | None = None) -> pd.DataFrame:
-    """The same for the cases of each ambiguity at the start, with the column `start`; variations are left out."""
-    return Summary(len(rows), against).add(rows).strata()
-
-
 def by_start(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """Part rows by how ambiguous their cases begin."""
     for name, here in _start_masks(frame["ambiguity_s"].to_numpy()):
@@ -140,8 +120,8 @@ class Summary:
         groups = {tuple(map(str, names)): group.index.to_numpy() for names, group in numbered}
         for key, places in groups.items():
             group, other = arrays.take(places), self._other_outcomes(arrays, groups, key)
-            parts = [] if key[SECTION.index("variation")] else _by_start(group)
-            for start, part in [(ALL_STARTS, group), *parts]:
+            parts = () if key[SECTION.index("variation")] else _start_masks(group["ambiguity_s"])
+            for start, part in [(ALL_STARTS, group), *((start, group.take(here)) for start, here in parts)]:
                 if len(part):
                     totals = self._groups.setdefault(start, {}).setdefault(key, Totals(self._most))
                     _take_in(totals, part, other, is_sample_source(key[GROUP.index("source")]))
@@ -168,11 +148,17 @@ class Summary:
         return arrays.take(places).outcomes()
 
     def table(self, cycle_us: Mapping[str, tuple[float, float | None]]) -> pd.DataFrame:
-        """See `summarise`."""
+        """One row per (scenario, variation, site, source, method), sorted by them.
+
+        A scenario with several sites also gets a row over all of them where they have the same source (site `all`).
+
+        Args:
+            cycle_us: For each method the time of one update per encounter in a full batch, and in a batch of one [us].
+        """
         return self._table(ALL_STARTS, cycle_us)
 
     def strata(self) -> pd.DataFrame:
-        """See `strata`."""
+        """The same for the cases of each ambiguity at the start, with the column `start`; variations are left out."""
         starts = [start for start in _starts() if start in self._groups]
         found = [self._table(start, {}).assign(start=start) for start in starts]
         return pd.concat(found, ignore_index=True) if found else pd.DataFrame()
@@ -222,11 +208,6 @@ def is_sample(group: pd.DataFrame) -> bool:
 def is_sample_source(source: str) -> bool:
     """See `is_sample`."""
     return source != "designed"
-
-
-def _by_start(rows: RowArrays) -> Iterator[tuple[str, RowArrays]]:
-    for name, here in _start_masks(rows["ambiguity_s"]):
-        yield name, rows.take(here)
 
 
 def _start_masks(ambiguity_s: FloatArray) -> Iterator[tuple[str, BoolArray]]:

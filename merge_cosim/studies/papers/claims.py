@@ -63,7 +63,7 @@ def claims_table(evidence: Evidence) -> Table:
 
 def _pgm_is_best(evidence: Evidence) -> Verdict:
     lines, leads = [], []
-    for scenario in _published_tests(evidence):
+    for scenario in [name for name in evidence.scenarios if name != "designed-3"]:
         rates = _rates(evidence, scenario, (*RIVALS, "pgm"))
         best = str(rates.drop("pgm").idxmin())
         lead = evidence.rate_difference(scenario, best, "pgm")
@@ -179,10 +179,6 @@ CLAIMS = (
     Claim("PGM needs no acceleration of other cars and little time", "PGM", _pgm_takes_little_time),
 )
 """The papers' claims; PGM: Dong, Dolan, Litkouhi 2017; FG-GMM: Lyu, Dong, Dolan 2020."""
-
-
-def _published_tests(evidence: Evidence) -> list[str]:
-    return [name for name in evidence.scenarios if name != "designed-3"]
 
 
 Lead = tuple[float, float, float]
