@@ -4,10 +4,13 @@ A block is `<!-- KIND: ARGUMENT -->` ... `<!-- end -->` in a page that is otherw
 """
 
 import re
+import tempfile
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+
+from merge_cosim.cli.main import app
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -20,6 +23,14 @@ def page_parser(about: str | None) -> ArgumentParser:
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder that the page is written into")
     parser.add_argument("--short", action="store_true", help="few cases: a check of the tool; its figures mean nothing")
     return parser
+
+
+def swept(words: Sequence[str], folder: Path | None = None) -> Path:
+    """Result folder of the sweep that `merge-cosim` runs by these words, unless the folder is given."""
+    if folder is None:
+        folder = Path(tempfile.mkdtemp(prefix="page-")) / "out"
+        app([*words, "--out", str(folder)], standalone_mode=False)
+    return folder
 
 
 def fill_page(name: str, docs: Path, kinds: Mapping[str, Callable[[str], str | None]]) -> None:

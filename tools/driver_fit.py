@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from blocks import fill_page, page_parser, table
 from kept_aside_page import pairs_of
-from method_proof import PAGE, SEED
+from method_proof import COSTS, PAGE, SEED, costs
 from scipy.stats import chi2
 
 import merge_cosim as mc
@@ -261,15 +261,11 @@ def table_of_driving(found: Found, data: Path | None, short: bool) -> str:
                     str(row.n),
                     str(row.failures),
                     str(row.stuck),
-                    f"{row.delay_s:.3f}",
-                    f"{row.distance_m:.1f}",
-                    f"{row.hardest_braking:.2f}",
-                    f"{row.mean_jerk:.2f}",
+                    *costs(row),
                 ]
             )
         words.append(command(scenario, settings))
-    head = ["scenario", "constants", "n", "failed", "stuck", "delay [s]", "D [m]"]
-    head += ["hardest braking [m/s²]", "jerk [m/s³]"]
+    head = ["scenario", "constants", "n", "failed", "stuck", *COSTS]
     asked = "\n".join(words)
     return f"```\n{asked}\n```\n\n{table(head, rows, left=2)}"
 

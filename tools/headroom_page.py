@@ -115,10 +115,9 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 def models(data: Path | None, scenario: str) -> str | None:
     """What of a scenario's table depends on the model; None without data, and for the blocks of another tool."""
-    if data is None or scenario != "designed-3":
-        return None
     words = ["sweep", scenario, "--method", ",".join(METHODS), "--world", "closed-form"]
-    return paragraph(what_flips(under_models(words, data), "scenario"))
+    found = under_models(words, data) if scenario == "designed-3" else None
+    return None if found is None else paragraph(what_flips(found, "scenario"))
 
 
 if __name__ == "__main__":

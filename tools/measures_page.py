@@ -4,14 +4,13 @@ The page is written by hand but for its block `<!-- columns: results.parquet -->
 in `merge_cosim.results.schema`.
 """
 
-from pathlib import Path
+from collections.abc import Sequence
 
 import pyarrow as pa
-from blocks import filled, table
+from blocks import fill_page, page_parser, table
 
 from merge_cosim.results.schema import COLUMNS, SCHEMA_VERSION
 
-PAGE = Path(__file__).parent.parent / "docs" / "measures.md"
 TYPES = {pa.string(): "text", pa.bool_(): "yes/no", pa.float64(): "number", pa.int32(): "count"}
 
 
@@ -22,14 +21,9 @@ def columns(argument: str) -> str:
     return f"Schema version {SCHEMA_VERSION} of `{argument}`:\n\n" + table(head, rows, left=len(head))
 
 
-def updated(page: str) -> str:
-    """The page with its table filled anew."""
-    return filled(page, {"columns": columns})
-
-
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Rewrite the page."""
-    PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    fill_page("measures.md", page_parser(__doc__).parse_args(argv).docs, {"columns": columns})
 
 
 if __name__ == "__main__":

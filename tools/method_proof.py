@@ -40,6 +40,7 @@ LOSSES: list[tuple[str, dict[str, Any]]] = [
     *((scenario, {}) for scenario in ("shifted-idm", "shifted-late", "shifted-never-look", "us101-replay")),
 ]
 PAGE = "methods/interactive.md"
+COSTS = ["delay [s]", "D [m]", "hardest braking [m/s²]", "jerk [m/s³]"]
 
 
 @dataclass(frozen=True)
@@ -120,14 +121,9 @@ def shown(settings: dict[str, Any]) -> str:
     return ", ".join(f"`{key}={value}`" for key, value in settings.items())
 
 
-def stays(name: str, head: Sequence[str], again: Sequence[str]) -> list[list[str]]:
-    """Rows of a table on the page, of methods that are not made anew."""
-    text = (DOCS / PAGE).read_text(encoding="utf-8")
-    block = next(
-        one[0] for one in BLOCK.finditer(text) if (one["kind"], one["argument"]) == ("proof", name)
-    ).splitlines()
-    rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in block if line[:1] == "|"]
-    return [row for row in rows[2:] if row[head.index("method")] not in again]
+def costs(row: Any) -> list[str]:
+    """The cells of `COSTS` of a summary row."""
+    return [f"{row.delay_s:.3f}", f"{row.distance_m:.1f}", f"{row.hardest_braking:.2f}", f"{row.mean_jerk:.2f}"]
 
 
 def proof(name: str, short: bool, data: Path | None, again: Sequence[str] = ()) -> str | None:
@@ -136,8 +132,7 @@ def proof(name: str, short: bool, data: Path | None, again: Sequence[str] = ()) 
     if study.logged and data is None:
         return None
     methods = [method for method in study.methods if not again or method in again]
-    head = ["scenario", "method", "settings", "n", "failed", "stuck", "failed or stuck [%]", "delay [s]", "D [m]"]
-    head += ["hardest braking [m/s²]", "jerk [m/s³]"]
+    head = ["scenario", "method", "settings", "n", "failed", "stuck", "failed or stuck [%]", *COSTS]
     rows = []
     for settings in study.settings:
         given = settings | (SHORT.get(study.scenarios[0], {}) if short else {})
@@ -157,10 +152,7 @@ def proof(name: str, short: bool, data: Path | None, again: Sequence[str] = ()) 
                     str(row.failures),
                     str(row.stuck),
                     interval,
-                    f"{row.delay_s:.3f}",
-                    f"{row.distance_m:.1f}",
-                    f"{row.hardest_braking:.2f}",
-                    f"{row.mean_jerk:.2f}",
+                    *costs(row),
                 ]
             )
     if not any(row[2] for row in rows):
@@ -168,7 +160,8 @@ def proof(name: str, short: bool, data: Path | None, again: Sequence[str] = ()) 
     if again:
         order = [shown(settings) for settings in study.settings]
         at = head.index("settings") if "settings" in head else None
-        rows += stays(name, head, again)
+        page = rows_of((DOCS / PAGE).read_text(encoding="utf-8"), name)
+        rows += [list(row.values()) for row in page if row["method"] not in again]
         rows.sort(key=lambda row: (0 if at is None else order.index(row[at]), *row[: len(head) - 8]))
     return f"`{study.command(study.settings[0])}`\n\n{table(head, rows, left=len(head) - 8)}"
 

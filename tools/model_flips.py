@@ -6,25 +6,31 @@ from pathlib import Path
 from textwrap import fill
 
 import pandas as pd
+from blocks import swept
 
-from merge_cosim.cli.main import app
 from merge_cosim.results.statistics.ensemble import RANK, rivals
 from merge_cosim.studies.training import train_ensemble
 
 MODELS = 10
 
 
-def under_models(words: Sequence[str], data: Path) -> pd.DataFrame:
+def under_models(words: Sequence[str], data: Path | None, folder: Path | None = None) -> pd.DataFrame | None:
     """Summary of `merge-cosim sweep` with these words under models that are each trained on another third of the cars.
+
+    None with neither data nor folder.
 
     Args:
         words: Words of the command, without its model and its folder.
         data: Folder with real NGSIM files.
+        folder: Its result folder, if it was run already.
     """
-    folder = Path(tempfile.mkdtemp(prefix="models-"))
-    train_ensemble("us101", data, "ngsim", 0, folder / "models", splits=MODELS)
-    app([*words, "--model", str(folder / "models"), "--out", str(folder / "out")], standalone_mode=False)
-    return pd.read_json(folder / "out" / "summary.json")
+    if folder is None:
+        if data is None:
+            return None
+        models = Path(tempfile.mkdtemp(prefix="models-"))
+        train_ensemble("us101", data, "ngsim", 0, models, splits=MODELS)
+        folder = swept([*words, "--model", str(models)])
+    return pd.read_json(folder / "summary.json")
 
 
 def what_flips(summary: pd.DataFrame, row: str, base: str | None = None) -> str:

@@ -7,15 +7,13 @@ NGSIM files in `--data` both are also run under ten models, each trained on anot
 depends on them; `--models` and `--shifted-models` take the result folders of that. Without them those parts stay.
 """
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
-from blocks import fill_page, page_parser, table
+from blocks import fill_page, page_parser, swept, table
 from model_flips import paragraph, under_models, what_flips
 
-from merge_cosim.cli.main import app
 from merge_cosim.report.methods import in_order
 from merge_cosim.results.statistics.ensemble import RANK
 
@@ -33,10 +31,7 @@ SHORT = ("--set", "encounters.count=8", "--jobs", "1", "--traces", "0")
 
 def summary_of(words: Sequence[str], short: bool, folder: Path | None) -> pd.DataFrame:
     """Summary of the sweep, which is run unless its folder is given."""
-    if folder is None:
-        folder = Path(tempfile.mkdtemp(prefix="robustness-")) / "out"
-        app([*words, *(SHORT if short else ()), "--out", str(folder)], standalone_mode=False)
-    return pd.read_json(folder / "summary.json")
+    return pd.read_json(swept([*words, *(SHORT if short else ())], folder) / "summary.json")
 
 
 def block(words: Sequence[str], summary: pd.DataFrame, row: str) -> str:
@@ -79,7 +74,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         parser.add_argument(f"--{name}", type=Path, help="result folder of this sweep under several models")
     given = parser.parse_args(argv)
     summary = summary_of(SENSING, given.short, given.sensing)
-    models = _under_models(SENSING, given.data, given.models)
+    models = under_models(SENSING, given.data, given.models)
     parts = {
         "sensing": block(SENSING, summary, "variation"),
         "short": in_short(summary),
@@ -87,19 +82,13 @@ def main(argv: Sequence[str] | None = None) -> None:
     }
     fill_page("sensors.md", given.docs, {kind: lambda _, made=made: made for kind, made in parts.items()})
     shifted = block(SHIFTED, summary_of(SHIFTED, given.short, given.shifted), "scenario")
-    models = _under_models(SHIFTED, given.data, given.shifted_models)
+    models = under_models(SHIFTED, given.data, given.shifted_models)
     flips = None if models is None else paragraph(what_flips(models, "scenario", "designed-3"))
     fill_page(
         "tests.md",
         given.docs,
         {"shifted": lambda _: shifted, "models": lambda name: flips if name == "shifted" else None},
     )
-
-
-def _under_models(words: Sequence[str], data: Path | None, folder: Path | None) -> pd.DataFrame | None:
-    if folder is not None:
-        return pd.read_json(folder / "summary.json")
-    return None if data is None else under_models(words, data)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,15 @@ from merge_cosim.results.statistics.rates import wilson
 KINDS = ("right", "refused", "wrong", "traceback", "line", "hang", "crash", "process")
 
 
+def summed(runs: Sequence[dict[str, Any]], what: str) -> dict[str, Counter[str]]:
+    """How often each end has come in all runs, by target or kind of fault."""
+    counts = {name: Counter[str]() for run in runs for name in run[what]}
+    for run in runs:
+        for name, ends in run[what].items():
+            counts[name].update(ends)
+    return counts
+
+
 def fuzz(runs: Sequence[dict[str, Any]]) -> str:
     """The commands, and what became of each target's inputs in all of them."""
     stretches: list[list[int]] = []  # seed, first input and number of inputs; parts that follow each other are one
@@ -31,10 +40,7 @@ def fuzz(runs: Sequence[dict[str, Any]]) -> str:
         else:
             stretches.append([seed, first, inputs])
     commands = [f"python tools/fuzz.py --seed {s} --first {first} --inputs {inputs}" for s, first, inputs in stretches]
-    counts = {name: Counter[str]() for run in runs for name in run["targets"]}
-    for run in runs:
-        for name, ends in run["targets"].items():
-            counts[name].update(ends)
+    counts = summed(runs, "targets")
     found = [(name, ends) for name, ends in counts.items() if ends.total()]
     rows = [[name, *(f"{ends[kind]:,}" for kind in KINDS)] for name, ends in found]
     whole = sum(counts.values(), Counter[str]())
@@ -54,10 +60,7 @@ def ramps(found: dict[str, Any]) -> str:
 def faults(runs: Sequence[dict[str, Any]]) -> str:
     """The commands, and how the sweeps ended, by kind of fault."""
     commands = [f"python tools/faults.py --faults {run['faults']} --seed {run['seed']}{_only(run)}" for run in runs]
-    ends = {name: Counter[str]() for run in runs for name in run["kinds"]}
-    for run in runs:
-        for name, found in run["kinds"].items():
-            ends[name].update(found)
+    ends = summed(runs, "kinds")
     whole = sum(ends.values(), Counter[str]())
     rows = [[f"`{name}`", str(found["same"]), str(found["wrong"])] for name, found in ends.items()]
     rows.append(["**all**", f"**{whole['same']}**", f"**{whole['wrong']}**"])

@@ -9,17 +9,15 @@ folder of that.
 """
 
 import shlex
-import tempfile
 import textwrap
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
 
 import pandas as pd
-from blocks import page_parser
+from blocks import page_parser, swept
 from model_flips import under_models, what_flips
 
-from merge_cosim.cli.main import app
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.registry import parameters
 from merge_cosim.ramps.ramp import Ramp
@@ -70,7 +68,7 @@ followed by `python tools/sensitivity_page.py --from {out}`.
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the sweep, if need be, and write the page."""
     parser = page_parser(__doc__)
-    parser.add_argument("--data", help="folder with NGSIM files")
+    parser.add_argument("--data", type=Path, help="folder with NGSIM files")
     parser.add_argument("--from", dest="folder", type=Path, help="result folder of the sweep, if it was run already")
     parser.add_argument("--models", type=Path, help="result folder of designed-2 under several models")
     arguments = parser.parse_args(argv)
@@ -81,23 +79,15 @@ def main(argv: Sequence[str] | None = None) -> None:
     words += ["--world", "closed-form"]
     if arguments.short:
         words += ["--jobs", "1", *(word for step in COARSE for word in ("--set", f"encounters.{step}"))]
-    folder = arguments.folder
-    if folder is None:
-        folder = Path(tempfile.mkdtemp(prefix="sensitivity-")) / "out"
-        data = ["--data", arguments.data] if arguments.data else []
-        app([*words[1:], *data, "--out", str(folder)], standalone_mode=False)
+    data = ["--data", str(arguments.data)] if arguments.data else []
+    folder = swept([*words[1:], *data], arguments.folder)
     rows = pd.read_json(folder / "summary.json", dtype={"variation": str})
     real = (rows.loc[rows["scenario"] == "us101-replay", "source"] == "ngsim").all()
     source = "real NGSIM data (fragments and merging episodes)" if real else "the SYNTHETIC surrogate"
     command = " ".join(shlex.quote(word) for word in [*words, *(["--data", "DIR"] if real else []), "--out", "OUT"])
     parts = [HEAD.format(source=source, command=command.replace(" --", " \\\n    --"), out="OUT")]
-    models = None
-    if arguments.models is not None:
-        models = pd.read_json(arguments.models / "summary.json")
-    elif arguments.data is not None:
-        models = under_models(
-            ["sweep", "designed-2", "--method", ",".join(RIVALS), "--world", "closed-form"], Path(arguments.data)
-        )
+    usual = ["sweep", "designed-2", "--method", ",".join(RIVALS), "--world", "closed-form"]
+    models = under_models(usual, arguments.data, arguments.models)
     parts.append(findings(rows, models))
     titles = {choice.partition("=")[0]: title for choice, title in CHOICES.items()}
     parts += [section(rows, name, titles[name]) for name in (choice.partition("=")[0] for choice in choices)]

@@ -7,15 +7,13 @@ summary, its table of the traffic as a whole, and what they say in short, into t
 `--from` it takes result folders of the same scenes under different methods instead.
 """
 
-import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
 
 import pandas as pd
-from blocks import fill_page, page_parser, table
+from blocks import fill_page, page_parser, swept, table
 
-from merge_cosim.cli.main import app
 from merge_cosim.report.methods import in_order
 from merge_cosim.results.statistics.rates import wilson
 
@@ -26,12 +24,11 @@ SHORT = ("encounters.replications=1", "encounters.demand.duration=100", "encount
 """Settings of the short mode: one scene of 100 s."""
 
 
-def command(out: str, short: bool = False) -> list[str]:
+def command(short: bool = False) -> list[str]:
     """The sweep; in short mode two methods on one scene of each scenario."""
     methods = ["--method", ",".join(("slot", BOUNDS[0]) if short else (*METHODS, *BOUNDS))]
     settings = [word for setting in SHORT if short for word in ("--set", setting)]
-    jobs = ["--jobs", "1"] if short else []
-    return ["merge-cosim", "sweep", *SCENARIOS, *methods, *settings, *jobs, "--out", out]
+    return ["merge-cosim", "sweep", *SCENARIOS, *methods, *settings, *(["--jobs", "1"] if short else [])]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -39,13 +36,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = page_parser(__doc__)
     parser.add_argument("--from", dest="folders", nargs="+", type=Path, help="result folders, if run already")
     given = parser.parse_args(argv)
-    folders = given.folders
-    if folders is None:
-        folders = [Path(tempfile.mkdtemp(prefix="traffic-")) / "out"]
-        app(command(str(folders[0]), given.short)[1:], standalone_mode=False)
+    folders = given.folders or [swept(command(given.short)[1:])]
     summary = pd.concat([pd.read_json(folder / "summary.json") for folder in folders])
     traffic = pd.concat([pd.read_csv(folder / "traffic.csv") for folder in folders])
-    shown = " ".join(command("OUT")).replace(" --method", " \\\n    --method", 1).replace(" --out", " \\\n    --out")
+    shown = (
+        " ".join([*command(), "--out OUT"])
+        .replace(" --method", " \\\n    --method", 1)
+        .replace(" --out", " \\\n    --out")
+    )
     parts = ["```", shown, "```", ""]
     parts.append(f"{int(traffic['scenes'].sum())} scenes.")
     parts += ["", "### All three together", "", together(summary, traffic)]

@@ -30,16 +30,8 @@ TIES = {
 """The first two rows of `trajectories-0750am-0805am.txt` (car 2) and of `trajectories-0400-0415.txt` (car 1)."""
 
 DRAWN = {
-    "us101": {
-        1: "centerline1",
-        2: "centerline2",
-        3: "centerline3",
-        4: "centerline4",
-        5: "centerline5",
-        6: "auxilliary",
-    },
-    "i80": {1: "centerline1", 2: "centerline2", 3: "centerline3", 4: "centerline4", 5: "centerline5", 6: "centerline6"}
-    | {7: "onramp"},
+    "us101": {number: f"centerline{number}" for number in range(1, 6)} | {6: "auxilliary"},
+    "i80": {number: f"centerline{number}" for number in range(1, 7)} | {7: "onramp"},
 }
 """The drawn centre line of each NGSIM lane."""
 
