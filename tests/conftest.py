@@ -1,5 +1,6 @@
 """What the tests share: the real data where it is at hand, and a cache of their own."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -17,6 +18,7 @@ for library in ("OMP", "OPENBLAS"):  # before numpy is imported: the tests fill 
 # they start many processes, each of which would otherwise compile every module anew
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+gc.disable()  # until the tests are collected: what is read until then stays to the end
 
 
 COMPILING = ("sweep", "designed-random", "--method", "interactive,dbn-pf,ipcb", "--set", "encounters.count=1")
@@ -39,6 +41,12 @@ def compile_kernels(config: pytest.Config) -> None:
     command = [sys.executable, "-m", "merge_cosim", *COMPILING, "--jobs", "1", "--world", "closed-form", "--out", "out"]
     quiet = subprocess.DEVNULL
     config.add_cleanup(subprocess.Popen(command, cwd=folder.name, stdout=quiet, stderr=quiet).wait)
+
+
+def pytest_collection_finish() -> None:
+    """The collector need not search modules and tests again and again."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -75,11 +83,11 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def short_surrogate() -> None:
-    """One recording of five minutes of each site, by SUMO as ever, in place of three of fifteen."""
+    """One recording of three minutes of each site, by SUMO as ever, in place of three of fifteen."""
     from merge_cosim.ngsim.surrogate.recipe import RECIPES
 
     for name, recipe in RECIPES.items():
-        RECIPES[name] = replace(recipe, seeds=recipe.seeds[:1], duration=300.0)
+        RECIPES[name] = replace(recipe, seeds=recipe.seeds[:1], duration=180.0)
 
 
 def own_registries() -> Iterator[None]:

@@ -12,7 +12,7 @@ import pytest
 from command import COMMAND, merge_cosim
 
 PAGE = Path(__file__).parent.parent / "docs" / "extending.md"
-COARSE = "encounters.host_speed.step=8", "encounters.merging_speed.step=8", "encounters.host_offset.step=5"
+COARSE = "encounters.host_speed.step=12", "encounters.merging_speed.step=12", "encounters.host_offset.step=5"
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_an_installed_entry_point(files):
 def test_a_study_from_python(files):
     study = files / "study.py"
     coarse = {name: float(step) for name, _, step in (value.partition("=") for value in COARSE)}
-    text, changed = re.subn(r"\bjobs=", f"settings={coarse!r}, jobs=", study.read_text(encoding="utf-8"))
+    text, changed = re.subn(r"\bjobs=2\b", f"settings={coarse!r}, jobs=1", study.read_text(encoding="utf-8"))
     assert changed == 1
     study.write_text(text, encoding="utf-8")
     assert "cautious" in in_a_process(files, sys.executable, "study.py")

@@ -84,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> None:
                 screenshot(browser, address, theme, int(width), int(height), target)
             else:
                 shutil.copy(folder / source, target)
-            Image.open(target).convert("RGB").save(target, optimize=True)
+            Image.open(target).convert("RGB").save(target, optimize=not given.short)
 
 
 if __name__ == "__main__":

@@ -76,7 +76,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Run the sweeps and write the page and its picture."""
     given = page_parser(__doc__).parse_args(argv)
     step = 8 if given.short else 2
-    limits, lengths, ahead = (LIMITS[::3], LENGTHS[:2], AHEAD[:1]) if given.short else (LIMITS, LENGTHS, AHEAD)
+    limits, lengths, ahead = (LIMITS[::3], LENGTHS[:1], AHEAD[:1]) if given.short else (LIMITS, LENGTHS, AHEAD)
     grid: dict[str, object] = {
         f"encounters.{axis}.step": step for axis in ("host_offset", "host_speed", "merging_speed")
     }

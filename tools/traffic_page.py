@@ -20,8 +20,8 @@ from merge_cosim.results.statistics.rates import wilson
 SCENARIOS = ("traffic-light", "traffic-dense", "traffic-stop-and-go")
 METHODS = ("acc", "slot", "slot-time", "pgm", "pgm-time", "fg-time", "ipcb", "ipcb+acc", "dbn-pf", "interactive")
 BOUNDS = ("always-go", "always-yield")
-SHORT = ("encounters.replications=1", "encounters.demand.duration=100", "encounters.demand.warm_up=20")
-"""Settings of the short mode: one scene of 100 s."""
+SHORT = ("encounters.replications=1", "encounters.demand.duration=60", "encounters.demand.warm_up=10")
+"""Settings of the short mode: one scene of a minute."""
 
 
 def command(short: bool = False) -> list[str]:

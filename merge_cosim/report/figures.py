@@ -62,6 +62,7 @@ def write_figures(
                 file = stem.with_name(f"{stem.name}.{kind}")
                 with canvas.style():
                     drawing.figure.savefig(file, dpi=DPI, metadata=UNDATED[kind])
+                drawing.figure.set_layout_engine("none")  # the margins that the first format found are those of all
                 files.append(file)
             data = stem.with_name(f"{stem.name}.csv")
             drawing.data.to_csv(data, index=False)

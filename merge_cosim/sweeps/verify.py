@@ -24,7 +24,7 @@ from merge_cosim.scenarios.scenario import Scenario
 from merge_cosim.scenarios.sources import Table
 from merge_cosim.simulation.worlds.traffic import TRAFFIC
 from merge_cosim.sweeps.chunks import ChunkQueue, cut
-from merge_cosim.sweeps.executors import Processes
+from merge_cosim.sweeps.executors import executor_for
 from merge_cosim.sweeps.identity import digest, digest_of, ramp_files, software
 from merge_cosim.sweeps.plan import SweepRequest, tasks_of
 from merge_cosim.sweeps.task import Task
@@ -103,8 +103,9 @@ def verify(
         parts, expected = some(task, of_task, share, rng)
         tasks += parts
         stored.append(expected)
-    with closing(Processes(jobs, plugins)) as executor:
-        tables = [finished.rows for finished in executor.run(ChunkQueue(cut(tasks)))]
+    queue = ChunkQueue(cut(tasks))
+    with closing(executor_for(request, len(queue))) as executor:
+        tables = [finished.rows for finished in executor.run(queue)]
     again = pa.concat_tables([table.replace_schema_metadata() for table in tables]).to_pandas()
     chosen = pd.concat(stored, ignore_index=True)
     ramps = {ramp: digest_of(ramp_files(ramp)) for ramp in manifest["ramps"]}

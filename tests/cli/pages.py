@@ -32,7 +32,7 @@ from merge_cosim.report import figures
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(?P<language>\w*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
-GRID = ("encounters.host_offset.step=5", "encounters.host_speed.step=8", "encounters.merging_speed.step=8")
+GRID = ("encounters.host_offset.step=5", "encounters.host_speed.step=12", "encounters.merging_speed.step=12")
 SCENE = ("encounters.replications=1", "encounters.demand.duration=30", "encounters.demand.warm_up=5")
 FEWER = {
     "designed-1": ("encounters.fraction=0.97",),

@@ -10,7 +10,7 @@ ramp = "us101"
 
 [encounters]
 kind = "traffic"
-replications = 3
+replications = 2
 
 [encounters.demand]
 duration = 60
@@ -35,7 +35,7 @@ ROUTES = """<routes>
 
 
 def small_scene(folder: Path) -> Path:
-    """Write a scenario of three scenes of a minute."""
+    """Write a scenario of two scenes of a minute."""
     file = folder / "minute.toml"
     file.write_text(SMALL)
     return file

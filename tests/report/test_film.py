@@ -48,7 +48,7 @@ def test_the_car_ahead_is_drawn_at_its_gap(in_scene):
 
 @pytest.mark.slow
 def test_a_meeting_in_traffic_has_other_cars_with_the_lengths_of_their_types(tmp_path):
-    scene = mc.load_scenario("traffic-light", {"encounters.demand.duration": 120})
+    scene = mc.load_scenario("traffic-light", {"encounters.demand.duration": 120, "encounters.replications": 1})
     results = mc.sweep([scene], ["acc"], jobs=1)
     run = mc.run(scene, results.rows["case"].iloc[0], "acc")
     others = other_cars(run.task, run.row["case"])

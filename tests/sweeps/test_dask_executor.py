@@ -7,16 +7,18 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from command import COMMAND, merge_cosim, refused, run_process, small_scenario
+from command import merge_cosim, refused, small_scenario
 from scene_files import small_scene
 
 import merge_cosim as merge_cosim_package
 from merge_cosim.sweeps import dask_executor
+from merge_cosim.sweeps.cases import PairCases
 
 pytest.importorskip("distributed", reason="dask.distributed is an extra: pip install 'merge-cosim[dask]'")
 
@@ -76,27 +78,33 @@ def workers(scheduler, folder, count=1, threads=1, **environment):
 
 
 @pytest.mark.slow
-def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path, scheduler):
+def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path, scheduler, monkeypatch):
     (tmp_path / "shipped.py").write_text(PLUGIN)
     ramp = merge_cosim("ramp", "new", "mine", "--out", "ramps", cwd=tmp_path)
     assert ramp.returncode == 0, ramp.stderr
+    monkeypatch.setattr(PairCases, "most", 60)  # many small chunks
     arguments = (
-        *("sweep", "designed-random", "--set", "encounters.count=1200", "--set", "ramp=ramps/mine"),
+        *("sweep", "designed-random", "--set", "encounters.count=360", "--set", "ramp=ramps/mine"),
         *("--method", "pgm", "--method", "shipped", "--plugin", "shipped.py"),
     )
     alone = merge_cosim(*arguments, "--out", "alone", "--jobs", 1, cwd=tmp_path)
     assert alone.returncode == 0, alone.stderr
-    with workers(scheduler, tmp_path / "workers", count=2) as (lost, _):
-        command = [*COMMAND, *map(str, arguments), "--dask", scheduler, "--out", "there"]
-        sweep = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-        deadline = time.monotonic() + 120
-        while not list(tmp_path.glob("there/parts/*.parquet")) and time.monotonic() < deadline:
-            time.sleep(0.02)
+    finished = []
+
+    def kill_when_rows_are_there():
+        until = time.monotonic() + 120
+        while not finished and time.monotonic() < until:
+            time.sleep(0.005)
+            finished.extend(tmp_path.glob("there/parts/*.parquet"))
         lost.send_signal(signal.SIGKILL)
-        parts = len(list(tmp_path.glob("there/parts/*.parquet")))
-        assert 0 < parts < 4  # in mid-run, and rows had come back by then
-        _, error = sweep.communicate(timeout=240)
-        assert sweep.returncode == 0, error
+
+    with workers(scheduler, tmp_path / "workers", count=2) as (lost, _):
+        killer = threading.Thread(target=kill_when_rows_are_there)
+        killer.start()
+        there = merge_cosim(*arguments, "--dask", scheduler, "--out", "there", cwd=tmp_path)
+        killer.join()
+    assert there.returncode == 0, there.stderr
+    assert 0 < len(finished) < 12  # in mid-run, and rows had come back by then
     assert (tmp_path / "there/results.parquet").read_bytes() == (tmp_path / "alone/results.parquet").read_bytes()
     assert json.loads((tmp_path / "there/manifest.json").read_text())["command"]["dask"] == scheduler
 
@@ -104,7 +112,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_one_process(tmp_path, 
 @pytest.mark.slow
 def test_workers_with_several_threads_are_refused(tmp_path, scheduler):
     with workers(scheduler, tmp_path / "workers", threads=2):
-        done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", scheduler, cwd=tmp_path)
+        done = merge_cosim("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", scheduler, cwd=tmp_path)
     assert done.returncode == 2
     assert "2 threads" in done.stderr
     assert "--nthreads 1" in done.stderr
@@ -117,7 +125,7 @@ def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path,
     with (other / "core" / "units.py").open("a") as file:
         file.write("# edited\n")
     with workers(scheduler, tmp_path / "workers", PYTHONPATH=str(other.parent)):
-        done = run_process("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", scheduler, cwd=tmp_path)
+        done = merge_cosim("sweep", small_scenario(tmp_path), "--method", "acc", "--dask", scheduler, cwd=tmp_path)
     assert done.returncode == 2
     assert re.search(r"worker \S+ has merge-cosim's source [0-9a-f]{16} instead of [0-9a-f]{16}", done.stderr)
     assert len(done.stderr.strip().splitlines()) == 1
@@ -126,8 +134,8 @@ def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path,
 @pytest.mark.slow
 def test_a_local_cluster_gives_the_same_bytes(tmp_path):
     scenarios = small_scenario(tmp_path), small_scene(tmp_path)
-    for out, run, where in (("here", merge_cosim, ()), ("there", run_process, ("--dask", "local", "--jobs", 1))):
-        done = run("sweep", *scenarios, "--method", "pgm", *where, "--out", out, cwd=tmp_path)
+    for out, where in (("here", ()), ("there", ("--dask", "local", "--jobs", 1))):
+        done = merge_cosim("sweep", *scenarios, "--method", "pgm", *where, "--out", out, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
     for name in ("results.parquet", "scenes.csv", "notes.csv"):

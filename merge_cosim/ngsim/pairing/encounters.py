@@ -33,7 +33,7 @@ of one. It holds the merges of the episodes itself, so these are then left out."
 Source = Literal["ngsim", "recorded", "surrogate"]
 """Whether cars were filmed, by NGSIM or elsewhere, or simulated."""
 
-CACHE_FROM = 1.0
+CACHE_FROM = 0.2
 """Pairs that take longer than this [s] to extract are cached."""
 
 

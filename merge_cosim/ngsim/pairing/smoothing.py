@@ -5,6 +5,7 @@ that no car has. The symmetric filter takes this out without a lag. It looks ahe
 a merging car goes through the causal filter, which at each cycle knows only the cycles up to it.
 """
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -64,6 +65,7 @@ def filter_causally(values: FloatArray, window: int, order: int) -> FloatArray:
     return filtered
 
 
+@cache
 def _last_value_taps(window: int, order: int) -> FloatArray:
     """Weights that give the last value of a fit to `window` values (of a lower order where these are too few)."""
     from scipy.signal import savgol_coeffs

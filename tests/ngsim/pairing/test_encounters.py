@@ -65,6 +65,7 @@ def test_slow_pairs_are_cached_until_file_or_rules_change(tmp_path: Path, monkey
     data.mkdir()
     monkeypatch.setenv("MERGE_COSIM_CACHE", str(cache))
     pq.write_table(table(*merge_at(30, "a")), data / "a.parquet")
+    monkeypatch.setattr(module, "CACHE_FROM", 60.0)
     site_pairs(data, US101)
     assert not list((cache / "encounters").iterdir())  # quick enough
     monkeypatch.setattr(module, "CACHE_FROM", 0.0)

@@ -22,7 +22,7 @@ from merge_cosim.ramps.ramp import Ramp, read_net
 
 US101 = site("us101")
 
-SHORT = {name: replace(recipe, seeds=(7, 8), duration=40.0, warm_up=60.0) for name, recipe in RECIPES.items()}
+SHORT = {name: replace(recipe, seeds=(7, 8), duration=40.0, warm_up=30.0) for name, recipe in RECIPES.items()}
 NUMBER_OF_PAIRS = {"us101": 354, "i80": 452}
 """Published sizes (Dong, Dolan, Litkouhi 2017, Table I), from recordings of 45 minutes."""
 
@@ -84,7 +84,7 @@ def test_another_recipe_has_another_place_in_the_cache() -> None:
 
 def test_a_row_in_feet_by_hand(tmp_path: Path) -> None:
     run = {
-        "timestep_time": [60.0, 60.1],
+        "timestep_time": [30.0, 30.1],
         "vehicle_id": ["merging.0", "merging.0"],
         "vehicle_type": ["drivers-0", "drivers-0"],
         "vehicle_lane": ["weave_0", "weave_1"],
@@ -122,7 +122,7 @@ def test_sumo_that_fails_is_reported_in_one_line(tmp_path: Path) -> None:
 
 @sites
 def test_there_are_as_many_pairs_as_published_of_both_kinds(site: Site) -> None:
-    """In proportion to the time: the tests have one recording of five minutes."""
+    """In proportion to the time: the tests have one recording of three minutes."""
     recipe = RECIPES[site.name]
     expected = NUMBER_OF_PAIRS[site.name] * len(recipe.seeds) * recipe.duration / 2700
     paired = site_pairs(surrogate_folder(site), site, source="surrogate")
