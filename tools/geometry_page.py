@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from blocks import fill_page, page_parser, table
-from geometry.lines import SURVEY_FOOT, FloatArray, Line, read_lines
+from geometry.lines import SURVEY_FOOT, Line, read_lines
 from geometry.plan import Plan
 from geometry.positions import positions
 from geometry.residuals import judge, lane_centres, origin_of
@@ -21,7 +21,7 @@ from geometry.sites import DRAWN, TIES
 from matplotlib.axes import Axes
 from ramp_geometry import NETS, fitted, plan_of
 
-from merge_cosim.core.units import FOOT
+from merge_cosim.core.units import FOOT, FloatArray
 from merge_cosim.ramps.definition import read_ramp_file
 from merge_cosim.ramps.ramp import Ramp, read_net
 

@@ -44,7 +44,10 @@ def peers(commonroad_python: Path | None = None) -> list[dict[str, Any]]:
 def environment_steps(
     encounters: int = ENCOUNTERS, warm_up: int = WARM_UP, steps: int = STEPS, **options: Any
 ) -> float:
-    """Environment steps per second of processor time of the vector environment, under random actions."""
+    """Environment steps per second of processor time of the vector environment, under random actions.
+
+    `steps` are timed after `warm_up` others, so that encounters of every age run side by side.
+    """
     import gymnasium
 
     import merge_cosim.gym

@@ -31,6 +31,6 @@ Rgba = tuple[int, int, int, int]
 
 
 def rgba(color: str) -> Rgba:
-    """An opaque colour as four numbers."""
+    """An opaque colour, given as `#rrggbb`, as four numbers from 0 to 255."""
     red, green, blue = bytes.fromhex(color.removeprefix("#"))
     return red, green, blue, 255

@@ -285,9 +285,8 @@ def _from_outside(joint: Joint) -> bool:
         ((low, high), (through_low, through_high)) = ((found[0], found[-1]) for found in indices)
         if low < through_low or high > through_high:
             return bool(low < through_low)
-    ends = [edge.getShape() for edge in (joint.link, joint.through)]
-    far = next((p for p in reversed(ends[0]) if math.dist(p, ends[0][-1]) >= LOOK_BACK), ends[0][0])
-    (x, y), (end_x, end_y) = ends[1][-2:]
+    far, _ = _last_part(joint.link.getShape())
+    (x, y), (end_x, end_y) = joint.through.getShape()[-2:]
     side = (end_x - x) * (far[1] - end_y) - (end_y - y) * (far[0] - end_x)
     return bool((side > 0.0) == keeps_left(joint.gore))
 

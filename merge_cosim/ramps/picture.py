@@ -120,7 +120,7 @@ def _marks(axes: Axes, net: Any, file: RampFile, ramp: Ramp, turned: _Turned) ->
     section = next(one for one in after if one.start <= ramp.merging_point)
     line = polyline.through(list(turned(net.getEdge(section.edge).getLane(section.lane).getShape())))
     share = (ramp.merging_point - section.start) / section.length
-    ways = np.append(0.0, np.hypot(*np.diff(line, axis=0).T).cumsum())
+    ways = polyline.ways(line)
     place = [np.interp(share * ways[-1], ways, line[:, axis]) for axis in (0, 1)]
     label = f"merging point, {ramp.merging_point:g} m"
     axes.plot(*place, marker="*", ms=16, color="gold", mec="black", ls="", zorder=10, label=label)

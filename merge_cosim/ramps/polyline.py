@@ -16,6 +16,11 @@ def length(line: FloatArray) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
+def ways(line: FloatArray) -> FloatArray:
+    """Way along a line to each of its points [m], shape (points,)."""
+    return np.append(0.0, np.hypot(*np.diff(line, axis=0).T).cumsum())
+
+
 def through(points: Sequence[Any]) -> FloatArray:
     """A line through points, without those too near to the one before; the first and the last stay."""
     kept = [points[0]]
@@ -52,10 +57,10 @@ def with_length(line: FloatArray, wanted: float, at_start: bool) -> FloatArray:
     """The line cut, or made longer straight on, to `wanted` metres at its start or its end."""
     if at_start:
         return with_length(line[::-1], wanted, at_start=False)[::-1]
-    ways = np.append(0.0, np.hypot(*np.diff(line, axis=0).T).cumsum())
-    last = min(max(int(np.searchsorted(ways, wanted - MIN_SPACING)), 1), len(line) - 1)
-    direction = (line[last] - line[last - 1]) / (ways[last] - ways[last - 1])
-    return np.vstack([line[:last], line[last - 1] + direction * (wanted - ways[last - 1])])
+    way = ways(line)
+    last = min(max(int(np.searchsorted(way, wanted - MIN_SPACING)), 1), len(line) - 1)
+    direction = (line[last] - line[last - 1]) / (way[last] - way[last - 1])
+    return np.vstack([line[:last], line[last - 1] + direction * (wanted - way[last - 1])])
 
 
 def nearest_on(start: FloatArray, end: FloatArray, point: FloatArray) -> FloatArray:

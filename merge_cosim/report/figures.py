@@ -41,7 +41,7 @@ def write_figures(
 ) -> list[Path]:
     """Write every figure of a result folder as `NAME.svg`, `.pdf`, `.png` and `.csv`, and the tables beside them.
 
-    The arguments are those of `Results.figures`.
+    The arguments are those of `Results.figures`: width of a figure in cm, size of the type in pt.
 
     Returns:
         The files.

@@ -96,7 +96,10 @@ def arrival_figure(model: IntentionModel) -> Figure:
 
 
 def mixture_figure(model: IntentionModel, lag: int = 1) -> Figure:
-    """V_{t-lag} x V_t for both intentions (as FG-GMM's Fig. 5): shares of transitions, and the mixture's ellipses."""
+    """V_{t-lag} x V_t for both intentions (as FG-GMM's Fig. 5): shares of transitions, and the mixture's ellipses.
+
+    Between the two speeds [m/s] lie `lag` cycles.
+    """
     learned = model.speed(lag)
     counts = learned.histogram.counts.astype(np.float64)
     shares = counts / counts.sum(axis=(1, 2), keepdims=True)

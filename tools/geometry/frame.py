@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from geometry.lines import SURVEY_FOOT, FloatArray, Line
-from merge_cosim.core.units import FOOT
+from geometry.lines import SURVEY_FOOT, Line
+from merge_cosim.core.units import FOOT, FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-FloatArray = NDArray[np.float64]
+from merge_cosim.core.units import FloatArray
+from merge_cosim.ramps import polyline
 
 SURVEY_FOOT = 1200 / 3937
 """US survey foot [m], the unit of the California state plane (EPSG:2229, 2227); in metres it is EPSG:26945, 26943."""
@@ -31,7 +31,7 @@ class Line:
     @cached_property
     def stations(self) -> FloatArray:
         """Arc length of each corner from the start, (n,) [m]."""
-        return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))])
+        return polyline.ways(self.points)
 
     @property
     def length(self) -> float:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.lines import FloatArray
 from geometry.plan import Edge, Plan
+from merge_cosim.core.units import FloatArray
 from merge_cosim.ramps.create.folder import opening
 from merge_cosim.ramps.view import ROLES
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from geometry.frame import Frame
-from geometry.lines import FloatArray, Line
+from geometry.lines import Line
 from geometry.ramp_lanes import Correction
+from merge_cosim.core.units import FloatArray
 
 TOLERANCE = 0.02
 """Corners are left out where the shape changes by less than this [m]."""

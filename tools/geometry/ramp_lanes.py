@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from geometry.frame import Frame
-from geometry.lines import FloatArray, Line
+from geometry.lines import Line
+from merge_cosim.core.units import FloatArray
 
 BLEND = 20.0
 """A drawn line is led onto the axis of the auxiliary lane over this length before the node [m]."""

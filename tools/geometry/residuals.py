@@ -9,7 +9,8 @@ import pandas as pd
 import sumolib
 
 from geometry.frame import Frame
-from geometry.lines import FloatArray, Line
+from geometry.lines import Line
+from merge_cosim.core.units import FloatArray
 from merge_cosim.ramps.ramp import Ramp, read_net
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 
 from geometry.frame import Frame, Tie
-from geometry.lines import FloatArray, Line, read_lines
+from geometry.lines import Line, read_lines
 from geometry.plan import TOLERANCE, Edge, Plan, main_edges, through_connections
 from geometry.ramp_lanes import fit_correction, joined, led, onward, up_to
 from geometry.survey import SMOOTHING, lane_centres, middle, strip_widths
+from merge_cosim.core.units import FloatArray
 
 ZONE_5 = "+proj=lcc +lat_0=33.5 +lon_0=-118 +lat_1=35.4666666666667 +lat_2=34.0333333333333"
 ZONE_3 = "+proj=lcc +lat_0=36.5 +lon_0=-120.5 +lat_1=38.4333333333333 +lat_2=37.0666666666667"

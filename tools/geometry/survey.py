@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from geometry.lines import FloatArray, Line
+from geometry.lines import Line
+from merge_cosim.core.units import FloatArray
 
 STEP = 2.0
 """Distance between the places where lines are compared [m]."""

@@ -18,7 +18,10 @@ _SIDE = "ramp new: --left-hand and --right-hand are for --from-osm"
 def start_ramp(
     folder: Path, numbers: Mapping[str, Any], net: Path | None, extract: Path | None, link: str | None
 ) -> tuple[Path, list[str]]:
-    """Write a ramp into a new folder; also what was found in the file it was made from, a line each.
+    """Write a ramp into a new folder, which names it; also what was found in the file it was made from, a line each.
+
+    It is made of the fields of `RampNumbers` that are given, or taken from a SUMO net or an extract of OpenStreetMap,
+    of which `link` is an edge of the on-ramp.
 
     Raises:
         UserError: The arguments contradict each other, or the ramp cannot be made.

@@ -59,7 +59,7 @@ class Lanelet:
 
     def ways(self) -> FloatArray:
         """SUMO position of each point of the middle [m], shape (points,); the last is the lane's length."""
-        way = np.append(0.0, np.hypot(*np.diff(self.middle, axis=0).T).cumsum())
+        way = polyline.ways(self.middle)
         return way * (self.length / way[-1])
 
     def at(self, position: FloatArray) -> FloatArray:
@@ -122,7 +122,7 @@ def _boundaries(row: Sequence[sumolib.net.lane.Lane]) -> list[FloatArray]:
     Between two lanes it is the left one's edge, so that a lane that runs slantwise into its neighbour tapers.
     """
     shapes = [np.array(lane.getShape(), dtype=float) for lane in row]
-    ways = [np.append(0.0, np.hypot(*np.diff(shape, axis=0).T).cumsum()) for shape in shapes]
+    ways = [polyline.ways(shape) for shape in shapes]
     shares = np.unique(np.concatenate([way / way[-1] for way in ways]))
     spacing = polyline.MIN_SPACING / min(way[-1] for way in ways)
     kept = [0.0]
