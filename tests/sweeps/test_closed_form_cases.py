@@ -55,9 +55,9 @@ def test_the_closed_form_ends_as_sumo_does(scenario, request_):
 
 def test_batches_do_not_matter():
     session = WorkerSession()
-    for task in tasks("designed-2", "closed-form", 300, ("acc", "pgm", "dbn-pf")):
+    for task in tasks("designed-2", "closed-form", 120, ("acc", "pgm", "dbn-pf")):
         whole = rows(task, session)
-        for size in (7, 128):
+        for size in (7, 64):
             pd.testing.assert_frame_equal(whole, rows(task, session, size), check_exact=True)
     session.close()
 

@@ -61,7 +61,7 @@ alone = mc.sweep(scenario, methods, jobs=1, **more)
 print(len(alone), alone.rows["failed"].sum(), *sorted(alone.manifest["components"]))
 assert mc.sweep(scenario, methods, jobs=2, **more).rows.equals(alone.rows)
 try:
-    mc.sweep(scenario, [Lead(lead=-1), "acc"], jobs=2, **more)
+    mc.sweep(scenario, [Lead(lead=-1), "acc"], jobs=2, start="forkserver", **more)
 except Refused as error:
     print(error)
 if "dask" in sys.argv:
