@@ -37,7 +37,7 @@ SCENE = ("encounters.replications=1", "encounters.demand.duration=30", "encounte
 FEWER = {
     "designed-1": ("encounters.fraction=0.97",),
     "designed-2": GRID,
-    "designed-3": ("encounters.count=40",),
+    "designed-3": ("encounters.count=20",),
     "designed-random": ("encounters.count=40",),
     "us101-replay": ("encounters.fraction=0.97",),  # the share of the cars for training; the others are tested
     "traffic-dense": SCENE,

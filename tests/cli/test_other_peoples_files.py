@@ -71,7 +71,7 @@ def test_a_motorway_from_openstreetmap(tmp_path: Path) -> None:
         "--set",
         "encounters.host=veh_mw_passenger",
         "--set",
-        "encounters.end=120",
+        "encounters.end=100",
     )
     done = merge_cosim("sweep", *how, "--out", "out", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -80,7 +80,7 @@ def test_a_motorway_from_openstreetmap(tmp_path: Path) -> None:
     assert len(found) > 0
     assert found["case"].str.match(r"000/veh_mw\d+/veh\d+").all()
     (scene,) = table(tmp_path / "out" / "scenes.csv")
-    assert float(scene["simulated_s"]) == 120.0
+    assert float(scene["simulated_s"]) == 100.0
 
 
 def test_a_configuration_of_everything(tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def test_a_configuration_without_a_described_net_infers_its_ramp_and_says_so(tmp
     for each in ("ramp", "ramp.sumocfg", "input_additional.add.xml"):
         source = GAMES / each
         (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / each)
-    words = ("sweep", "ramp.sumocfg", "--method", "acc", "--set", "encounters.end=60")
+    words = ("sweep", "ramp.sumocfg", "--method", "acc", "--set", "encounters.end=100")
     # A whole number is an id like any other; no car of these files has it.
     done = merge_cosim(*words, "--set", "encounters.host=7", cwd=tmp_path)
     assert (done.returncode, "no vehicle, flow or type of its files has this id" in done.stderr) == (2, True), (

@@ -267,7 +267,7 @@ stations, speeds = st.floats(-90, -1), st.floats(0, 28)
 accelerations = st.lists(st.floats(-4, 3), min_size=30, max_size=30)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 @given(stations, speeds, stations, speeds, accelerations)
 def test_an_escape_that_exists_at_the_start_avoids_the_overlap_whatever_the_driver_does(s_h, v_h, s_m, v_m, driven):
     """Until the end: the driver does anything, but brakes once it has been behind in the lane for the reaction time."""

@@ -23,7 +23,9 @@ from merge_cosim.results.store import ResultFolder
 def figures(swept, command, tmp_path_factory):
     out = tmp_path_factory.mktemp("figures")
     words = ("--figures", out, "--width", 8.4, "--font-size", 7, "--columns", "n,failure_pct,delay_s")
-    assert command("report", swept, *words) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("merge_cosim.report.figures.DPI", 100)
+        assert command("report", swept, *words) == 0
     return out
 
 

@@ -95,7 +95,7 @@ def test_the_earliest_passage_against_every_sequence_of_accelerations():
             Ahead.of(pair(host, speed, merging), 0, rules), host, speed, 0.6, Reach(29.0, speed_step=0.1)
         )
         best = np.inf
-        plans = np.array(list(product((-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0), repeat=7)))
+        plans = np.array(list(product((-4.0, -2.0, -1.0, 0.0, 1.0, 2.0), repeat=7)))
         v = np.maximum(speed + np.cumsum(plans * DT, axis=1), 0.0)
         s = host + np.cumsum(v * DT, axis=1)
         m = merging[1:8]

@@ -165,7 +165,7 @@ def test_real_pairs_have_the_rows_of_the_pair_test_when_the_leader_is_not_heeded
     for batch in plan(request):
         scenario = load_scenario("us101-scene", {"full_scene.heed_leader": False})
         scenes = scenes or load_scenes(scenario, "ngsim", data_dir)
-        few = batch.take(np.arange(0, len(batch), 3))
+        few = batch.take(np.arange(0, len(batch), 6))
         alone = few.run(worker_session)[0]
         assert scenario.full_scene is not None
         assert few.cases.encounters is not None
