@@ -92,6 +92,9 @@ class DriverBlocks:
 
     def reset(self, rows: IntArray, labels: IntArray, keys: Keys) -> None:
         """See `HostDriver.reset`."""
+        if len(self._blocks) == 1:
+            self._blocks[0].reset(rows, labels, keys)
+            return
         for number, block in enumerate(self._blocks):
             own = np.flatnonzero(rows // self._size == number)
             if len(own):
@@ -110,6 +113,9 @@ class DriverBlocks:
 
     def rest(self, rows: IntArray) -> None:
         """See `Estimator.rest`."""
+        if len(self._blocks) == 1:
+            self._blocks[0].rest(rows)
+            return
         for number, block in enumerate(self._blocks):
             block.rest(rows[rows // self._size == number] - number * self._size)
 

@@ -195,7 +195,7 @@ class Loop:
         world = self._world
         world.observe(*self._recorder.next_cycle())
         self._age += 1
-        over = np.flatnonzero(self._open & self._watch.over(self._age, self._recorder.seen))
+        over = (self._open & self._watch.over(self._age, self._recorder.seen)).nonzero()[0]
         if len(over):
             self._over_at[over] = self._age[over]
             self._open[over] = False

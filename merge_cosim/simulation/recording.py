@@ -76,7 +76,8 @@ class Recorder:
         """Begin encounters in the present cycle; the last state of the old ones is overwritten."""
         now = self._cycles[self._now]
         now[:LOG_ODDS, slots] = start[:4].round(DECIMALS)
-        now[RECORDED : self._of_controller, slots] = around
+        if len(around):
+            now[RECORDED : self._of_controller, slots] = around
         self.lengths[:, slots] = start[4:]
 
     def track(self, slot: int, cycles: int) -> FloatArray:

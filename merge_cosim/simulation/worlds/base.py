@@ -251,7 +251,7 @@ class GivenWorld(World):
         self._active += count
         self.collided[slots] = False
         around = self.place(slots, cases)
-        start, labels = self._encounters.start[:, cases], self._encounters.label[cases]
+        start, labels = self._encounters.start.take(cases, axis=1), self._encounters.label[cases]
         return Begun(slots, cases, start, labels, self._keys[cases], self._score_until[cases], around)
 
     def ended(self, over: IntArray, age: IntArray) -> Ended | None:

@@ -86,7 +86,8 @@ class TiledWorld(GivenWorld):
         """Their rows; None for all."""
         self._merge_position = np.zeros(slots)
         self._length = np.full((2, slots), np.nan)
-        self._in_host_lane = np.ones(slots, dtype=bool)
+        self._changes_at = np.full(slots, np.inf)
+        """Station at which each car from the ramp changes lane [m]; inf once it has."""
         self.state = np.zeros((4, slots))
         self._closed_form = np.zeros((2, slots))
 
@@ -120,7 +121,7 @@ class TiledWorld(GivenWorld):
         start = self.encounters.start.take(cases, axis=1)
         self.state[:, slots] = start[:4]
         self._closed_form[:, slots] = start[:2]
-        self._in_host_lane[slots] = not self.ramp.changes_lane
+        self._changes_at[slots] = -TOLERANCE
         self._merge_position[slots] = self.encounters.merge_position[cases]
         rows = [*slots.tolist(), *(slots + self.slots).tolist()]
         names, numbers = [self._names[row] for row in rows], cases.tolist()
@@ -132,9 +133,11 @@ class TiledWorld(GivenWorld):
         self.session.place_all(names, lanes, positions, speeds)
         self.calls_s += perf_counter() - begin
         length = start[4:]
-        for other in np.flatnonzero(self._length[:, slots] != length).tolist():
-            self.session.set_length(names[other], float(length.flat[other]))
-        self._length[:, slots] = length
+        differs = self._length.take(slots, axis=1) != length
+        if np.count_nonzero(differs):
+            for other in np.flatnonzero(differs).tolist():
+                self.session.set_length(names[other], float(length.flat[other]))
+            self._length[:, slots] = length
         return np.empty((0, len(slots)))
 
     def command(self, speeds: FloatArray) -> None:
@@ -163,7 +166,7 @@ class TiledWorld(GivenWorld):
     def ended(self, over: IntArray, age: IntArray) -> Ended | None:
         """See `World`; the stations are compared with the closed form's, in which a difference would have added up."""
         if len(over):
-            apart = np.maximum(*np.abs(self.state[:2, over] - self._closed_form[:, over]))
+            apart = np.abs(self.state[:2].take(over, axis=1) - self._closed_form.take(over, axis=1)).max(axis=0)
             largest = float(apart.max())
             self.worst_difference_m = max(self.worst_difference_m, largest)
             if not largest <= TOLERANCE:
@@ -204,19 +207,19 @@ class TiledWorld(GivenWorld):
 
     def _change_lanes(self, reached: FloatArray) -> None:
         """Command the lane changes of this cycle; `reached`: stations of the cars from the ramp at its end [m]."""
-        arrives = ~self._in_host_lane & (reached >= -TOLERANCE)
-        for tile in np.flatnonzero(arrives).tolist():
+        arrives = (reached >= self._changes_at).nonzero()[0]
+        for tile in arrives.tolist():
             edge = self._lanes.place("main", max(float(reached[tile]), 0.0), float(self._merge_position[tile])).edge
             name = self._names[tile + self._by_ramp * self.slots]
             # Where a car enters another edge, SUMO adds to the commanded lane what the car's own number grows by.
             grows = self._lanes.merging_lane(edge) - int(self.session.lane(name).rpartition("_")[2])
             self.session.change_lane(name, self._lanes.host_lane(edge) - grows)
-        self._in_host_lane |= arrives
+        self._changes_at[arrives] = np.inf
 
     def _park(self) -> None:
-        """Let the cars of free tiles stand."""
-        busy = np.tile(self._case >= 0, 2)
-        idle, self._rows = np.flatnonzero(~busy).tolist(), np.flatnonzero(busy)
+        """Let the cars of tiles that have become free stand."""
+        idle = [*self._free.tolist(), *(self._free + self.slots).tolist()]
+        self._rows = np.flatnonzero(np.tile(self._case >= 0, 2))
         self.session.command([self._names[row] for row in idle], [0.0] * len(idle))
         self._driven = [self._names[row] for row in self._rows.tolist()]
 
@@ -228,9 +231,10 @@ class TiledWorld(GivenWorld):
             raise self._gone() from None
         self.calls_s += perf_counter() - begin
         station = self._along.x(position, self._rows).reshape(2, self.slots) - self._merge_position
-        np.subtract(station, self.state[:2], out=self.state[2:])
-        self.state[2:] /= DT
-        self.state[:2] = station
+        before, speed = self.state[:2], self.state[2:]
+        np.subtract(station, before, out=speed)
+        speed /= DT
+        before[:] = station
         if colliding := self.session.colliding():
             for name in self._row.keys() & colliding:
                 self.collided[self._row[name] % self.slots] = True
