@@ -363,12 +363,15 @@ def _command() -> Any:
 
 def main() -> None:
     """Run the command line; a user's mistake is one line and exit status 2."""
+    import atexit
     import gc
     import io
     import os
     import sys
 
-    gc.set_threshold(50_000)  # what is imported stays: to search it again and again takes a tenth of a short command
+    # What is imported stays: to search it again and again, and once more at the end, takes a sixth of a short command.
+    gc.set_threshold(50_000)
+    atexit.register(gc.freeze)
     ended_by_signal()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

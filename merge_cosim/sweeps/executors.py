@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import _thread
+import atexit
+import gc
 import multiprocessing
 import os
 import pickle
@@ -198,6 +200,7 @@ def _serve(
     watch_parent()
     if inherited is not None:
         inherited.close()  # else the worker would not notice the end of its parent process
+    atexit.register(gc.freeze)  # at its end nothing is searched for unused objects, which takes as long as a chunk
     worker_session = WorkerSession()
     try:
         for plugin in plugins:

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from command import merge_cosim
+from command import merge_cosim, small_scenario
 
 from merge_cosim.bench import loops, peers, scaling, scenes, updates, worlds
 from merge_cosim.bench.bench import PARTS, crowded, machine
@@ -20,6 +20,7 @@ CHECKOUT = Path(__file__).parents[2]
 @pytest.mark.slow
 def test_every_figure_is_there_and_on_the_page(tmp_path, monkeypatch):
     monkeypatch.setattr(worlds, "METHODS", ("acc", "pgm"))
+    monkeypatch.setattr(worlds, "SCENARIO", str(small_scenario(tmp_path)))
     monkeypatch.setattr(scenes, "MODELS", ("Krauss",))
     monkeypatch.setattr(scaling, "COUNTS", (1, 2))
     monkeypatch.setattr(updates, "CYCLES", 5)

@@ -433,7 +433,18 @@ def test_hidden_intentions_through_the_command_line(tmp_path):
 
 
 def test_a_family_of_scenarios_is_run_as_one(tmp_path):
-    words = ("--world", "closed-form", "--method", "acc,pgm", "--set", "encounters.count=2", "--out", "out")
+    words = (
+        "--world",
+        "closed-form",
+        "--method",
+        "acc,pgm",
+        "--set",
+        "encounters.count=2",
+        "--traces",
+        0,
+        "--out",
+        "out",
+    )
     done = merge_cosim("sweep", "shifted", "designed-3", "shifted-idm", *words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     rows = pq.read_table(tmp_path / "out/results.parquet").to_pandas()

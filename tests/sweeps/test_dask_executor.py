@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,8 @@ import merge_cosim as merge_cosim_package
 from merge_cosim.sweeps import dask_executor
 from merge_cosim.sweeps.cases import PairCases
 
-pytest.importorskip("distributed", reason="dask.distributed is an extra: pip install 'merge-cosim[dask]'")
+MISSING = "dask.distributed is an extra: pip install 'merge-cosim[dask]'"
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason=MISSING)
 
 PLUGIN = """
 from dataclasses import dataclass
@@ -132,6 +134,7 @@ def test_a_worker_with_another_checkout_of_the_same_version_is_refused(tmp_path,
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Port 8787 is already in use")  # by the scheduler above
 def test_a_local_cluster_gives_the_same_bytes(tmp_path):
     scenarios = small_scenario(tmp_path), small_scene(tmp_path)
     for out, where in (("here", ()), ("there", ("--dask", "local", "--jobs", 1))):
