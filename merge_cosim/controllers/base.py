@@ -41,6 +41,15 @@ class Controller(Component):
     def reset(self, rows: IntArray) -> None:
         """Forget the encounters at `rows` of the batch; new ones begin there."""
 
+    def look_around(self, around: FloatArray) -> None:
+        """Called each cycle before `command` in worlds that have other cars.
+
+        Args:
+            around: Gap from the host to the car ahead in its lane [m], inf without one, and that car's speed [m/s]; how
+                far the merging car can go on beside the host lane, in which it may come in anywhere [m], 0 where it
+                comes in at station 0; shape (3, n).
+        """
+
     @abstractmethod
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """Return the host's acceleration [m/s^2], shape (n,).

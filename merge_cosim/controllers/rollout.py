@@ -67,6 +67,15 @@ class Rollout(ReactingDriver, Acc):
     beside the host is taken to wait until the host has passed. With `tolerated_risk=0` it is not, and an escape from
     the full bounds is never given up.
 
+    Where the merging car is beside the host lane and may come in anywhere up to the end of its own, as in living
+    traffic, each policy is rolled out against a driver who comes in where there is room (`compiled.beside`), and the
+    host keeps distance to its leader. The cost is
+
+    `J(pi) = progress t_goal + courtesy t_driver + effort int a_brake^2 dt + sudden`
+
+    with the times at which host and driver are `goal` past the end of the driver's lane. No overlap is expected of a
+    driver who looks, so no escape is asked for.
+
     Once the merging car is in the lane the law of acc drives. Beliefs, margins, reaction and the merging car's state
     are those of the estimator `interactive`; where that finds a sensor to be noisy, the deviations of station and speed
     are added to `spread` and `spread_rate`, and an escape must hold for states up to `escape_deviations` of them off,
@@ -86,6 +95,8 @@ class Rollout(ReactingDriver, Acc):
         progress: Cost of a second.
         effort: Cost of braking [s^3/m^2].
         sudden: Cost of a policy without a bound on the jerk [s].
+        courtesy: Cost of a second of a driver's who is beside the lane.
+        end_braking: Braking at which a driver beside the lane begins to stop at the end of its own [m/s^2].
         reacts: Drivers plan anew in each step; if not (an ablation), they keep their first plan to the merging point.
         commitment: How much cheaper another policy must be to be taken.
         max_jerk: Largest change of the command but for an escape [m/s^3].
@@ -117,6 +128,8 @@ class Rollout(ReactingDriver, Acc):
     progress: NonNegativeFloat = 1.0
     effort: NonNegativeFloat = 0.1
     sudden: NonNegativeFloat = 0.1
+    courtesy: NonNegativeFloat = 1.0
+    end_braking: PositiveFloat = 3.0
     reacts: bool = True
     commitment: NonNegativeFloat = 0.5
     max_jerk: PositiveFloat = 4.0
@@ -152,7 +165,7 @@ class Rollout(ReactingDriver, Acc):
     def start(self, count: int, setting: Setting) -> None:
         """Make room for the last commands and policies."""
         from merge_cosim.controllers.compiled.escapes import Bounds
-        from merge_cosim.controllers.compiled.rollouts import HostLaw
+        from merge_cosim.controllers.compiled.policies import HostLaw
 
         super().start(count, setting)
         self._driver_law = self.law(setting)
@@ -176,6 +189,8 @@ class Rollout(ReactingDriver, Acc):
             self.progress,
             self.effort,
             self.sudden,
+            self.courtesy,
+            self.end_braking,
             self.reacts,
         )
         self._bounds = Bounds(
@@ -195,6 +210,8 @@ class Rollout(ReactingDriver, Acc):
         self._held = np.array([held for _, _, held in _POLICIES])
         self._traits = np.tile([self.driver_margin, self.driver_margin, 0.0, 0.0, 0.0, 0.0], (count, 1))
         self._delays = np.zeros(count)
+        self._around = np.tile([[np.inf], [0.0], [0.0]], count)
+        self._offered = np.zeros(count)
         self._last = np.full(count, np.nan)
         self.last_policy = np.full(count, -1)
         self.last_belief = np.zeros((count, len(DRIVER_TYPES)))
@@ -210,10 +227,16 @@ class Rollout(ReactingDriver, Acc):
         self._last[rows] = np.nan
         self._recent_risk[rows] = 0.0
         self.last_policy[rows] = -1
+        self._offered[rows] = 0.0
         self._in_lane[rows] = 0.0
+
+    def look_around(self, around: FloatArray) -> None:
+        """See `Controller`."""
+        self._around = around
 
     def command(self, seen: Observation, log_odds: FloatArray, target: BoolArray) -> FloatArray:
         """The cheapest policy's acceleration, with commitment, bounded jerk and an escape."""
+        from merge_cosim.controllers.compiled.beside import note_room
         from merge_cosim.controllers.compiled.escapes import NONE, constrain
         from merge_cosim.controllers.compiled.rollouts import choose
 
@@ -222,12 +245,19 @@ class Rollout(ReactingDriver, Acc):
             seen, deviation, late = self._filter.observed(seen), self._filter.deviation[:2], self._filter.late
             target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
         wanted = super().command(seen, log_odds, target)
-        state = np.stack([*(getattr(seen, name) for name in STATE), *deviation, late])
+        gap, leader_speed, room = self._around
+        beside = room > 0.0
+        lead = np.where(beside, seen.host_station + gap, np.inf)
+        state = np.stack([*(getattr(seen, name) for name in STATE), *deviation, late, room, lead, leader_speed])
         self._plans = plans = ~seen.merging_in_lane
-        self.last_belief = self._belief(seen, log_odds)
+        waits = np.arange(len(DRIVER_TYPES)) == DRIVER_TYPES.index("wait")
+        self.last_belief = np.where(beside[:, None], waits, self._belief(seen, log_odds))
         traits, delays = self._traits, self._delays
         if self._filter is not None:
             traits, delays = self._filter.traits, self._filter.unreacted * self._filter.reaction_time
+        if np.count_nonzero(beside):
+            note_room(state, self._offered, self.setting.dt, self._host_law)
+            delays = np.where(beside, self._offered, delays)
         self._seen = state, self.last_belief, traits, delays, self._last
         rest = (
             self.last_belief,

@@ -39,7 +39,7 @@ class Driven(HostDriver):
         """The loop drives a copy of its method, and this one is driven from outside."""
         return self
 
-    def decide(self, seen: Observation) -> tuple[FloatArray, FloatArray]:
+    def decide(self, seen: Observation, around: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """See `HostDriver`; who yields believes that the merging car does not, and without a decision there is NaN."""
         if not self._decides:
             return np.full_like(self.action, np.nan), self.action

@@ -58,11 +58,12 @@ class HostDriver:
         for part in (self.sensor, self.estimator, self.controller):
             part.thin(rows)
 
-    def decide(self, now: Observation) -> tuple[FloatArray, FloatArray]:
+    def decide(self, now: Observation, around: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """The log-odds of NOT_YIELD and the acceleration to command [m/s^2], shape (n,) each.
 
         Args:
             now: The present cycle, before the sensor.
+            around: See `Controller.look_around`; None in a world without other cars.
 
         Raises:
             UserError: A component gives NaN, or an array of another shape.
@@ -70,6 +71,8 @@ class HostDriver:
         seen = self.sensor.observe(now)
         log_odds = _numbers(self.estimator.update(seen), self.estimator, seen)
         target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
+        if around is not None:
+            self.controller.look_around(around)
         acceleration = self.controller.command(seen, log_odds, target)
         return log_odds, _numbers(acceleration, self.controller, seen)
 
@@ -125,18 +128,20 @@ class DriverBlocks:
         block.thin(rows)
         self._size = len(rows)
 
-    def decide(self, seen: Observation, active: BoolArray) -> tuple[FloatArray, FloatArray]:
+    def decide(
+        self, seen: Observation, active: BoolArray, around: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """See `HostDriver.decide`; blocks without an active slot are left out, and their entries mean nothing."""
         self._decided.clear()
         if len(self._blocks) == 1 and np.count_nonzero(active):
             self._decided.add(0)
-            return self._blocks[0].decide(seen)
+            return self._blocks[0].decide(seen, around)
         log_odds, acceleration = np.zeros((2, len(active)))
         for number, block in enumerate(self._blocks):
             own = slice(number * self._size, (number + 1) * self._size)
             if np.count_nonzero(active[own]):
                 part = Observation(*(getattr(seen, one.name)[own] for one in fields(Observation)))
-                log_odds[own], acceleration[own] = block.decide(part)
+                log_odds[own], acceleration[own] = block.decide(part, around if around is None else around[:, own])
                 self._decided.add(number)
         return log_odds, acceleration
 

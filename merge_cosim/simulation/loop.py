@@ -176,9 +176,12 @@ class Loop:
         now, world = self._recorder.seen, self._world
         observed = self._merging_car.observed_speed(self._age, now.merging_speed)
         seen = now if observed is now.merging_speed else replace(now, merging_speed=observed)
-        log_odds, acceleration = self._driver.decide(seen, self._active)
-        if world.leader is not None:
-            acceleration = self._leader.cap(acceleration, now.host_speed, world.leader)
+        leader, around = world.leader, None
+        if leader is not None:
+            around = np.vstack([leader, world.room])
+        log_odds, acceleration = self._driver.decide(seen, self._active, around)
+        if leader is not None:
+            acceleration = self._leader.cap(acceleration, now.host_speed, leader)
         np.maximum(now.host_speed + acceleration * self._setting.dt, 0.0, out=self._speeds[0])
         self._effort.method_s += perf_counter() - begin
         self._speeds[1] = self._merging_car.next_speed(self._age, now)

@@ -1,79 +1,17 @@
 """The host's policies driven against each type of driver, step by step, and what each pair costs."""
 
-from math import exp, sqrt
-from typing import NamedTuple
+from math import exp
 
 import numpy as np
 
+from merge_cosim.controllers.compiled.beside import rollout_beside
+from merge_cosim.controllers.compiled.policies import SUDDEN, HostLaw, host_acceleration, time_left
 from merge_cosim.core.kernels import kernel
 from merge_cosim.core.units import BoolArray, FloatArray, IntArray
-from merge_cosim.estimators.compiled.drivers import TOL, DriverLaw, arrival, needed, reacting
+from merge_cosim.estimators.compiled.drivers import TOL, DriverLaw, reacting
 
-FREE, COAST, FOLLOW, BEHIND, FIXED, SUDDEN = 0, 1, 2, 3, 4, 5
-"""Policies; FIXED and SUDDEN hold an acceleration, SUDDEN with no bound on the change."""
 LOGISTIC = 1.702
 """Slope of the logistic function that is closest to the normal distribution."""
-
-
-class HostLaw(NamedTuple):
-    """Constants of the host and of the costs, see `merge_cosim.controllers.rollout.Rollout`."""
-
-    k_free: float
-    k_gap: float
-    k_speed: float
-    d0: float
-    headway: float
-    min_acceleration: float
-    max_acceleration: float
-    behind_margin: float
-    change: float
-    steps: int
-    step: float
-    goal: float
-    scored: float
-    overlap: float
-    spread: float
-    spread_rate: float
-    progress: float
-    effort: float
-    sudden: float
-    reacts: bool
-
-
-@kernel
-def host_acceleration(
-    policy: int,
-    held: float,
-    host_station: float,
-    host_speed: float,
-    station: float,
-    speed: float,
-    length: float,
-    host: HostLaw,
-    limit: float,
-) -> float:
-    """Acceleration [m/s^2] that a policy wants, within the host's bounds."""
-    free = host.k_free * (limit - host_speed)
-    follow = host.k_gap * (station - length - host_station - host.d0 - host.headway * host_speed) + host.k_speed * (
-        speed - host_speed
-    )
-    if station >= -TOL:
-        wanted = min(follow, free) if station - host_station >= -TOL else free
-    elif policy == FREE:
-        wanted = free
-    elif policy == COAST:
-        wanted = min(0.0, free)
-    elif policy == FOLLOW:
-        wanted = min(follow, free)
-    elif policy == BEHIND:
-        if host_station >= -TOL:
-            wanted = free
-        else:
-            time = arrival(station, speed) + host.behind_margin
-            wanted = min(needed(max(-host_station, 0.1), host_speed, time), free)
-    else:
-        wanted = min(held, free)
-    return min(max(wanted, host.min_acceleration), host.max_acceleration)
 
 
 @kernel
@@ -164,8 +102,7 @@ def rollout(
         if gap < -TOL or both * host.step >= host.scored:
             break
     if reached < 0.0:
-        pull = min(max(0.5 * host.k_free * (limit - host_speed), 0.05), host.max_acceleration)
-        reached = time + (sqrt(host_speed * host_speed + 2.0 * pull * (goal - host_station)) - host_speed) / pull
+        reached = time + time_left(goal - host_station, host_speed, limit, host)
     cost = host.progress * reached + host.effort * effort + extra
     probability = 1.0 / (1.0 + exp(min(max(LOGISTIC * surest, -50.0), 50.0)))
     return cost + host.overlap * probability, probability
@@ -187,6 +124,8 @@ def expected_cost(
     law: DriverLaw,
 ) -> tuple[float, float]:
     """Cost of a policy expected over the types of drivers, and probability of an overlap; see `rollout`."""
+    if state[9, row] > 0.0:
+        return rollout_beside(policy, held, state[:, row], delay, last, host, law), 0.0
     h, v, s, u, length_h, length_m = state[:6, row]
     spread, spread_rate = host.spread + state[6, row], host.spread_rate + state[7, row]
     expected, danger, left, likeliest = 0.0, 0.0, 0.0, 0
@@ -249,7 +188,11 @@ def cost_table(
         for policy in range(kinds.shape[0]):
             for kind in range(belief.shape[1]):
                 costs[row, policy, kind] = 0.0
-                if belief[row, kind] >= least:
+                if state[9, row] > 0.0:
+                    costs[row, policy, kind] = rollout_beside(
+                        kinds[policy], held[policy], state[:, row], delays[row], last[row], host, law
+                    )
+                elif belief[row, kind] >= least:
                     costs[row, policy, kind], _ = rollout(
                         kinds[policy],
                         held[policy],
@@ -296,11 +239,12 @@ def choose(
 
     Args:
         state: The rows of an `Observation`, the deviations of the merging car's station and speed, and how much further
-            on it may be [m], shape (9, n).
+            on it may be [m]; how far it can go on beside the lane, 0 where it comes in at the merging point [m], and
+            then the station of the rear of the car ahead of the host [m] and its speed [m/s]; shape (12, n).
         plans: Encounters whose merging car is not yet in the lane, shape (n,).
         belief: Belief in each type of driver, shape (n, types); types with less than `least` are left out, at cost 0.
         traits: The driver's trait under each type, see `planned`, shape (n, types).
-        delays: Time before the driver acts [s], shape (n,).
+        delays: Time before the driver acts [s]; beside the lane, for which it has had the room; shape (n,).
         kinds: What each policy is, shape (policies,).
         held: The acceleration of those that hold one [m/s^2], shape (policies,).
         last: The host's last command [m/s^2], NaN without one, shape (n,).

@@ -163,6 +163,14 @@ class World(ABC):
         """Gap to the car ahead of each host [m], inf without one, and its speed [m/s], shape (2, slots)."""
         return None
 
+    @property
+    def room(self) -> FloatArray:
+        """How far each merging car can go on beside the host lane before it comes in [m], shape (slots,).
+
+        It is 0 where the car comes in at station 0.
+        """
+        return np.zeros(self.slots)
+
     def settled(self, track: FloatArray, point: float) -> FloatArray:
         """A recorded track with its stations relative to `Ended.points`."""
         return track

@@ -56,6 +56,6 @@ class Undecided(HostDriver):
     def __init__(self) -> None:
         super().__init__(AlwaysGo(), Acc())
 
-    def decide(self, seen: Observation) -> tuple[FloatArray, FloatArray]:
+    def decide(self, seen: Observation, around: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """See `HostDriver`."""
         return np.full_like(seen.host_station, np.nan), np.zeros_like(seen.host_station)

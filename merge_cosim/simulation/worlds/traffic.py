@@ -151,6 +151,16 @@ class TrafficWorld(World):
             found[:, slot] = self._ahead[meeting.host.name]
         return found
 
+    @property
+    def room(self) -> FloatArray:
+        """See `World`; once a car is past the usual merging point, it may come in up to the end of its lane."""
+        left = np.zeros(self.slots)
+        for slot, meeting in self._by_slot.items():
+            x = meeting.merging.x
+            if meeting.merged_at < 0 and x >= self._ramp.merging_point:
+                left[slot] = max(self._ramp.ramp[-1].end - x, TOLERANCE)
+        return left
+
     def show(self, log_odds: FloatArray) -> None:
         """See `World`; the view follows a host as long as that is on its way, then the next one."""
         hosts = {host.name: -math.inf for host in self._driven}

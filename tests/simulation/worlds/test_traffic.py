@@ -276,3 +276,21 @@ def test_teleports_are_noted(tmp_path):
 
         drive(api, driven, 60, each)
     assert noted(driven, Event.TELEPORT) == ["vehicle o was teleported by SUMO"]
+
+
+def test_a_car_past_the_merging_point_may_come_in_up_to_the_end_of_its_lane(tmp_path):
+    found = []
+    cars = (vehicle("h", "host", 480, 15), vehicle("m", "merging", 490, 15, route="ramp"))
+    with us101(tmp_path, *cars) as (api, driven):
+        api.simulationStep()
+        api.vehicle.setLaneChangeMode("m", 0)
+        driven.cycle()
+
+        def each(_):
+            if api.vehicle.getLaneID("m") == "weave_0":
+                found.append((driven.world._around[1, 0], driven.world.room[0]))
+
+        drive(api, driven, 150, each)
+    x, room = np.array(found).T
+    assert x.min() < 42.0 - 20.0 < 213.0 - 20.0 < x.max()
+    np.testing.assert_allclose(room, np.where(x < 42.0, 0.0, np.maximum(213.0 - x, 1e-6)), atol=1e-5)
