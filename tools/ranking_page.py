@@ -15,7 +15,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from blocks import page_parser, table
+from blocks import fill_page, page_parser, table
 from scipy.stats import kendalltau
 
 import merge_cosim as mc
@@ -37,38 +37,13 @@ CONTROLLERS = ("acc", "lqr", "pcb", "rollout")
 SETTING = ["ahead", "speed_limit", "length"]
 OWN = ["weight", "model"]
 PICTURES = {"img/ranking.png": RULES, "img/ranking-learned.png": LEARNED}
-TEXT = """\
-# What decides the order of the methods
-
-{conclusion}
-
+SETTINGS = """\
 Made by `python tools/ranking_page.py`: Designed Test II in closed form, host's offset in steps of {step} m, both
 speeds in steps of {step} m/s (n = {n} per setting and method). {settings} settings were tried,
 and all of them are shown: speed limit {limits} m/s x length of both cars {lengths} m x meaning of
 'the host is ahead' for the designed merging car ({ahead}) x weight of closeness
 in iPCB's planner {weights} x training set ({models}; see [models](models.md)).
 The papers state none of the five. No default of the project was chosen from this page.
-
-## Failures over the open choices
-
-![Failure rates of the methods that learn nothing](img/ranking.png)
-
-[![Failure rates of the methods that learn (large)](img/ranking-learned.png)](img/ranking-learned.png)
-
-Failures in per cent; bold: the default. A row of maps per meaning of 'ahead', a column per method and choice of its own
-(iPCB's weight, the model of the learned methods), all of one scale.
-
-Kendall's tau compares the order of the {competitors} methods whose rates were published with the published order (1:
-the same, -1: reversed). A column per weight of closeness and training set:
-
-{orders}
-## Estimators and controllers apart
-
-Failures and, in brackets, hosts that never arrived, in per cent, with the scenario's defaults. Down: the estimator;
-across: the controller that drives on its estimate. Model `us101-ngsim-all`.
-
-{apart}
-{apart_words}
 """
 
 
@@ -97,8 +72,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     estimators = ESTIMATORS[:2] if given.short else ESTIMATORS
     pairs = [f"{estimator}+{controller}" for estimator in estimators for controller in controllers]
     apart = swept(pairs, grid).set_index("method")
-    text = TEXT.format(
-        conclusion=conclusion(orders, published),
+    tried = SETTINGS.format(
         step=step,
         n=f"{int(rows['n'].max()):,}",
         settings=len(orders),
@@ -107,15 +81,15 @@ def main(argv: Sequence[str] | None = None) -> None:
         ahead=", ".join(f"`{v}`" for v in ahead),
         weights=", ".join(f"{v:g}" for v in weights),
         models=", ".join(f"`{v}`" for v in models),
-        competitors=len(published),
-        orders=order_table(orders),
-        apart=table(
-            ["estimator", *controllers],
-            [[e, *(cell(apart.loc[f"{e}+{c}"]) for c in controllers)] for e in estimators],
-        ),
-        apart_words=apart_words(apart),
     )
-    (given.docs / "ranking.md").write_text(text, encoding="utf-8")
+    cells = [[e, *(cell(apart.loc[f"{e}+{c}"]) for c in controllers)] for e in estimators]
+    blocks = {
+        "conclusion": conclusion(orders, published) + "\n",
+        "settings": tried,
+        "orders": order_table(orders),
+        "apart": table(["estimator", *controllers], cells) + f"\n{apart_words(apart)}\n",
+    }
+    fill_page("ranking.md", given.docs, {"ranking": blocks.get})
 
 
 def swept(methods: Sequence[str], settings: dict[str, object], model: str | None = None) -> pd.DataFrame:
