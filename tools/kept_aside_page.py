@@ -97,7 +97,6 @@ def checks(known: pd.DataFrame, kept: pd.DataFrame) -> Iterator[dict[str, object
         (low, high), (soon, late) = rate_interval(before, cars), delay_interval(before, cars)
         yield {
             "method": method,
-            "known": 100 * before["failed"].mean(),
             "rate": rate,
             "rate_low": low,
             "rate_high": high,
@@ -125,21 +124,18 @@ def us101(data: Path, short: bool) -> str:
             )
             found += checks(known, kept)
     rows = pd.DataFrame(found)
-    lines = []
-    for method, one in rows.groupby("method", sort=False):
-        failed = one["known"].min(), one["known"].max(), one["rate"].min(), one["rate"].max()
-        delays = one["delay_low"].mean(), one["delay_high"].mean(), one["delay"].min(), one["delay"].max()
-        lines.append(
-            [
-                f"`{method}`",
-                f"{one['rate_low'].mean():.1f} to {one['rate_high'].mean():.1f}",
-                f"{failed[2]:.1f} to {failed[3]:.1f}",
-                f"{int(one['rate_in'].sum())} of {len(one)}",
-                f"{delays[0]:.2f} to {delays[1]:.2f}",
-                f"{delays[2]:.2f} to {delays[3]:.2f}",
-                f"{int(one['delay_in'].sum())} of {len(one)}",
-            ]
-        )
+    lines = [
+        [
+            f"`{method}`",
+            f"{one['rate_low'].mean():.1f} to {one['rate_high'].mean():.1f}",
+            f"{one['rate'].min():.1f} to {one['rate'].max():.1f}",
+            f"{int(one['rate_in'].sum())} of {len(one)}",
+            f"{one['delay_low'].mean():.2f} to {one['delay_high'].mean():.2f}",
+            f"{one['delay'].min():.2f} to {one['delay'].max():.2f}",
+            f"{int(one['delay_in'].sum())} of {len(one)}",
+        ]
+        for method, one in rows.groupby("method", sort=False)
+    ]
     head = [
         "method",
         "predicted %, mean",
