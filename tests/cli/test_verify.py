@@ -57,7 +57,7 @@ def test_a_changed_value_is_found_and_changed_versions_are_named(swept):
     beyond = {line["column"]: line["beyond"] for line in found["differences"]}
     assert beyond["failed"] == 132
     assert beyond["delay_s"] > 0
-    assert "values differ beyond the tolerance" in merge_cosim("verify", swept, cwd=swept.parent).stdout
+    assert "values differ beyond the tolerance" in merge_cosim("verify", swept, "--jobs", 2, cwd=swept.parent).stdout
 
 
 def test_scenes_of_traffic_are_run_again_as_they_were(tmp_path):
