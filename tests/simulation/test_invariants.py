@@ -7,15 +7,16 @@ from command import SMALL, merge_cosim
 from living import drive, us101, vehicle
 
 from merge_cosim.controllers.acc import Acc
-from merge_cosim.core.observation import Setting
+from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.estimators.references import AlwaysGo
 from merge_cosim.merging_cars.base import merging_cars
 from merge_cosim.ramps.ramp import Ramp
 from merge_cosim.results.invariants import checked
 from merge_cosim.results.rows import result_rows
 from merge_cosim.results.store import MANIFEST, ResultFolder
-from merge_cosim.scoring.invariants import INVARIANTS
+from merge_cosim.scoring.invariants import INVARIANTS, Bounds, broken
 from merge_cosim.scoring.rules import Rules
+from merge_cosim.scoring.tracks import Tracks
 from merge_cosim.simulation.host_driver import HostDriver
 from merge_cosim.simulation.loop import Loop, Run
 from merge_cosim.simulation.worlds.closed_form import ClosedFormWorld
@@ -50,10 +51,19 @@ def run(world, controller=None, merge_position=0.0) -> Run:
 def test_a_controller_that_leaves_its_bounds(commanded, expected):
     controller = Hasty()
     controller.commanded = commanded
-    broken = run(ClosedFormWorld(COUNT), controller).broken
-    assert set(broken) == expected
-    for where in broken.values():
+    found = run(ClosedFormWorld(COUNT), controller).broken
+    assert set(found) == expected
+    for where in found.values():
         assert where.sum() == COUNT / 5  # those that it was commanded to, and no other
+
+
+def test_a_standing_car_that_is_set_back_before_its_lane_change_is_no_jump():
+    """Of `TrafficWorld.settled` 2e-6 m, and 1e-6 m of two rounded stations; ten times that is one."""
+    for back, expected in ((3e-6, set()), (3e-5, {"jump"})):
+        merging = np.array([-back, 0.0, 0.0])
+        states = Observation(np.arange(3.0), np.full(3, 10.0), merging, np.zeros(3), np.full(3, 5.0), np.full(3, 5.0))
+        tracks = Tracks(states, np.zeros(3), np.zeros(1, np.int64), np.array([2]), {})
+        assert set(broken(tracks, Bounds(), Bounds())) == expected
 
 
 def meddled(meddle, at=30) -> Run:
