@@ -52,16 +52,18 @@ class Study:
         methods: Methods.
         settings: Settings of each sweep, one sweep after the other.
         logged: It needs real data.
+        world: In which world it is run.
     """
 
     scenarios: list[str]
     methods: list[str]
     settings: list[dict[str, Any]] = field(default_factory=lambda: [{}])
     logged: bool = False
+    world: str = "closed-form"
 
     def command(self, settings: dict[str, Any]) -> str:
         """The same sweep on the command line."""
-        words = ["merge-cosim", "sweep", *self.scenarios, "--method", ",".join(self.methods), "--world", "closed-form"]
+        words = ["merge-cosim", "sweep", *self.scenarios, "--method", ",".join(self.methods), "--world", self.world]
         words += [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
         return shlex.join([*words, "--out", "out/proof"])
 
@@ -102,6 +104,7 @@ STUDIES = {
     "shifted": Study(["shifted"], ["interactive", *OTHERS]),
     "shifted-seeds": Study(["shifted"], ["interactive", "slot-time", "ipcb"], [{"encounters.seed": 5}]),
     "replay": Study(["us101-replay"], [*RIVALS, "human"], logged=True),
+    "scene": Study(["us101-scene"], [*RIVALS, "human"], logged=True, world="sumo"),
     "sensing": Study(["designed-3"], ["interactive", *OTHERS], SENSING),
     "compensated": Study(
         ["designed-3"], ["interactive", *OTHERS], [given | {"sensing.compensated": True} for given in LATE]
@@ -137,7 +140,7 @@ def proof(name: str, short: bool, data: Path | None, again: Sequence[str] = ()) 
     for settings in study.settings:
         given = settings | (SHORT.get(study.scenarios[0], {}) if short else {})
         found = mc.sweep(
-            study.scenarios, methods, settings=given, data=data, world="closed-form", progress=False
+            study.scenarios, methods, settings=given, data=data, world=study.world, progress=False
         ).summary()
         for row in found.sort_values("scenario", kind="stable").itertuples():
             interval = f"{row.failed_or_stuck_pct:.2f}"
