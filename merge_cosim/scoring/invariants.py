@@ -16,8 +16,8 @@ HARDEST = 12.0
 SPEED_ERROR = 1e-3
 """Speeds are rounded to 1e-6 m/s, accelerations are so exact [m/s^2]."""
 JUMP = 4 * TOLERANCE
-"""Stations and speeds are rounded, so that a car's way in a cycle is exact to this [m], also where a car that stood just
-at the place where it then changes lane is told from one in the lane (`TrafficWorld.settled`)."""
+"""Stations and speeds are rounded, so that a car's way in a cycle is exact to this [m], also where a car that stood
+just at the place where it then changes lane is told from one in the lane (`TrafficWorld.settled`)."""
 INVARIANTS = {
     "speed": f"speeds lie in 0 ... {HIGHEST_SPEED:g} m/s",
     "acceleration": f"accelerations are within the bounds that a model states, else within {HARDEST:g} m/s^2",
