@@ -58,7 +58,8 @@ def read(file: Path) -> pd.DataFrame:
         raise BadInputError(
             f"{file}: {int(twice.sum())} rows have the key of another, such as {_name(table, keys, twice)}"
         )
-    return table.assign(**{key: table[key].astype(object).where(table[key].notna(), "").astype(str) for key in keys})
+    named = {key: table[key].astype(object).where(table[key].notna(), "").astype(str) for key in keys}
+    return table.assign(**named).copy()  # in one piece, or pandas warns
 
 
 def differences(file: str, one: pd.DataFrame, other: pd.DataFrame, part: bool = False) -> Iterator[str]:
