@@ -95,7 +95,7 @@ class Rollout(ReactingDriver, Acc):
         progress: Cost of a second.
         effort: Cost of braking [s^3/m^2].
         sudden: Cost of a policy without a bound on the jerk [s].
-        courtesy: Cost of a second of a driver's who is beside the lane.
+        courtesy: Cost of a second that a driver beside the lane takes.
         end_braking: Braking at which a driver beside the lane begins to stop at the end of its own [m/s^2].
         reacts: Drivers plan anew in each step; if not (an ablation), they keep their first plan to the merging point.
         commitment: How much cheaper another policy must be to be taken.
@@ -250,12 +250,13 @@ class Rollout(ReactingDriver, Acc):
         lead = np.where(beside, seen.host_station + gap, np.inf)
         state = np.stack([*(getattr(seen, name) for name in STATE), *deviation, late, room, lead, leader_speed])
         self._plans = plans = ~seen.merging_in_lane
-        waits = np.arange(len(DRIVER_TYPES)) == DRIVER_TYPES.index("wait")
-        self.last_belief = np.where(beside[:, None], waits, self._belief(seen, log_odds))
+        self.last_belief = self._belief(seen, log_odds)
         traits, delays = self._traits, self._delays
         if self._filter is not None:
             traits, delays = self._filter.traits, self._filter.unreacted * self._filter.reaction_time
         if np.count_nonzero(beside):
+            waits = np.arange(len(DRIVER_TYPES)) == DRIVER_TYPES.index("wait")
+            self.last_belief = np.where(beside[:, None], waits, self.last_belief)
             note_room(state, self._offered, self.setting.dt, self._host_law)
             delays = np.where(beside, self._offered, delays)
         self._seen = state, self.last_belief, traits, delays, self._last

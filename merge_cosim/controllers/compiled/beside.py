@@ -57,11 +57,11 @@ def note_room(state: FloatArray, offered: FloatArray, dt: float, host: HostLaw) 
 def rollout_beside(
     policy: int, held: float, state: FloatArray, offered: float, last: float, host: HostLaw, law: DriverLaw
 ) -> float:
-    """Cost of one policy of the host, with what the driver's own time costs; such a driver looks, so none of a risk.
+    """Cost of one policy of the host and of the driver's time; this driver looks, so no overlap is counted.
 
-    The driver goes on beside the lane, stops at the end of its own, and comes in once it has had the room for longer
-    than the time `offered` for which it has had it and not come. The host sees it at the merging point until then, and
-    keeps distance to the car ahead, as the driver does when it is in.
+    The driver goes on beside the lane, stops at the end of its own, and comes in once it has had room in this rollout
+    for longer than `offered`, the time for which it has had room so far without coming in. The host
+    sees it at the merging point until then, and keeps distance to the car ahead, as the driver does when it is in.
 
     Args:
         policy: The host's policy.
