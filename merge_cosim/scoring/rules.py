@@ -106,8 +106,8 @@ class Watch:
 
     def over(self, age: IntArray, now: Observation) -> BoolArray:
         """Where an encounter has failed, its horizon has been seen, or its time is up; `age` is the cycle of `now`."""
-        begins = self._rules.begun(now) > self._scored
-        if np.count_nonzero(begins):
+        begins = (self._rules.begun(now) > self._scored).nonzero()[0]
+        if len(begins):
             self._scored[begins] = True
             self._until[begins] = np.minimum(self._until[begins], age[begins] + self._horizon)
         return (age >= self._until) | (self._scored & (now.gap < -TOLERANCE))

@@ -56,7 +56,7 @@ class _Joint(NamedTuple):
     by_ramp: tuple[str, str]
 
 
-class LaneMap:
+class LaneMap(dict[str, RampLane | None]):
     """The lanes of a ramp's two paths. All lanes of an edge share one coordinate x [m past the gore].
 
     `lane_map[lane]` is the `RampLane` of a SUMO lane by its id, also in a net of copies; None off the two paths.
@@ -65,12 +65,10 @@ class LaneMap:
     def __init__(self, ramp: Ramp) -> None:
         self._ramp = ramp
         self._starts = {section.edge: section.start for section in ramp.main + ramp.ramp}
-        self._known: dict[str, RampLane | None] = {}
 
-    def __getitem__(self, lane: str) -> RampLane | None:
-        if lane not in self._known:
-            self._known[lane] = self._find(lane)
-        return self._known[lane]
+    def __missing__(self, lane: str) -> RampLane | None:
+        found = self[lane] = self._find(lane)
+        return found
 
     def start(self, edge: str) -> float:
         """X where an edge starts [m]; an edge off the two paths is the off-ramp, from the auxiliary lane's end on."""
@@ -177,18 +175,19 @@ class AlongPaths:
         self._starts = np.array([lanes.start(edge) for route in routes for edge in route])
         before = (0, len(routes[0]))
         self._numbers = [{edge: first + i for i, edge in enumerate(r)} for first, r in zip(before, routes, strict=True)]
-        self._count = count
         self._edge = np.repeat(before, count)
         self._edge_start = self._starts[self._edge]
         self._position = np.zeros(2 * count)
 
-    def put(self, rows: Sequence[int], where: Sequence[LanePosition]) -> None:
-        """Note that cars were placed, one at each of `rows`."""
-        chosen = np.array(rows)
-        edges = [self._numbers[row // self._count][one.edge] for row, one in zip(rows, where, strict=True)]
-        self._edge[chosen] = edges
-        self._edge_start[chosen] = self._starts[edges]
-        self._position[chosen] = [one.position for one in where]
+    def numbers(self, path: int, where: Sequence[LanePosition]) -> list[int]:
+        """The numbers by which `put` knows the edges of some places on a path, 0 or 1."""
+        return [self._numbers[path][one.edge] for one in where]
+
+    def put(self, rows: IntArray, edges: IntArray, positions: FloatArray) -> None:
+        """Note that cars were placed, one at each of `rows`: on edges, by their numbers, and lane positions [m]."""
+        self._edge[rows] = edges
+        self._edge_start[rows] = self._starts[edges]
+        self._position[rows] = positions
 
     def x(self, position: FloatArray, rows: IntArray | None = None) -> FloatArray:
         """X of all cars [m], shape (2 count,), from their lane positions after a step.

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from merge_cosim.core.colors import FOLLOWS, Rgba, rgba
+from merge_cosim.core.units import FloatArray
 from merge_cosim.sumo.modes import LaneChangeMode, SpeedMode
 from merge_cosim.sumo.vehicle_types import CONTROLLED, RGBA
 
@@ -129,9 +133,11 @@ class Session:
         """Set the speeds of the next step of many vehicles."""
         deque(map(self.set_speed, cars, speeds), maxlen=0)
 
-    def positions(self, cars: Sequence[str]) -> Iterable[float]:
-        """Positions of the front bumpers of many vehicles on their present lanes."""
-        return map(self.lane_position, cars)
+    def positions(self, cars: Sequence[str]) -> FloatArray:
+        """Positions of the front bumpers of many vehicles on their present lanes [m], shape (cars,)."""
+        found = np.empty(len(cars))
+        struct.pack_into(f"{len(cars)}d", found, 0, *map(self.lane_position, cars))  # faster than np.fromiter
+        return found
 
     def add(self, cars: Iterable[Car]) -> None:
         """Put in cars of one type that drive exactly as commanded; they stand until they are placed.

@@ -86,8 +86,8 @@ def test_nothing_is_broken_where_nobody_meddles():
 
 def test_a_car_that_is_put_elsewhere():
     def teleport(session):
-        lane, position = session.lane("t3.merging"), session.lane_position("t3.merging")
-        session.place("t3.merging", lane, position + 5.0)
+        lane, position = session.lane("merging.03"), session.lane_position("merging.03")
+        session.place("merging.03", lane, position + 5.0)
 
     broken = meddled(teleport).broken
     assert set(broken) == {"acceleration", "closed_form"}
@@ -96,9 +96,9 @@ def test_a_car_that_is_put_elsewhere():
 
 def test_a_car_on_the_wrong_lane():
     def astray(session):
-        edge = session.lane("t3.host").rpartition("_")[0]
+        edge = session.lane("host.03").rpartition("_")[0]
         assert edge == "t3.weave"
-        session.place("t3.host", "t3.weave_0", session.lane_position("t3.host"))
+        session.place("host.03", "t3.weave_0", session.lane_position("host.03"))
 
     broken = meddled(astray, at=60).broken
     assert set(broken) == {"lane"}
@@ -111,7 +111,7 @@ def test_a_contact_that_sumo_alone_reports(length, expected):
 
     def lengthen(session):
         for tile in range(COUNT):
-            session.set_length(f"t{tile}.host", length)
+            session.set_length(f"host.{tile:02}", length)
 
     run = meddled(lengthen)
     rows = result_rows(run, run.encounters, Setting(), Acc(), dict.fromkeys(("scenario", "variation", "method"), ""))

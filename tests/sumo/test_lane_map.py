@@ -92,10 +92,12 @@ def test_x_runs_on_where_cars_cross_to_the_next_edge() -> None:
     lanes, along = LaneMap(ramp), AlongPaths(ramp, 2)
     start = (("main", -10.0), ("main", 200.0), ("ramp", -1.0), ("ramp", 10.0))  # two hosts, then two merging cars
     places = [lanes.place(path, x - 42.0, 42.0) for path, x in start]
-    along.put([0, 1, 2, 3], places)
+    edges = np.array([*along.numbers(0, places[:2]), *along.numbers(1, places[2:])])
     positions = np.array([place.position for place in places])
+    along.put(np.arange(4), edges, positions)
     assert along.x(positions).tolist() == [x for _, x in start]
     assert along.x(np.array([2.0, 1.0, 3.0, 15.0])).tolist() == [2.0, 214.0, 3.0, 15.0]
-    along.put([0], [lanes.place("main", -142.0, 42.0)])  # back to a new start
+    back = [lanes.place("main", -142.0, 42.0)]  # to a new start
+    along.put(np.array([0]), np.array(along.numbers(0, back)), np.array([back[0].position]))
     assert along.x(np.array([401.0, 2.0, 4.0, 16.0])).tolist() == [-99.0, 215.0, 4.0, 16.0]
     assert along.x(np.array([402.0, 5.0]), np.array([0, 2])).tolist() == [-98.0, 215.0, 5.0, 16.0]  # the others stand

@@ -63,7 +63,11 @@ class TiledWorld(GivenWorld):
         self._id = tile_id if tiled else _own_id
         net = tile_net(ramp, slots) if tiled else ramp.net
         self.session = open_session(SumoOptions(net, seed=seed, extra=extra))
-        self._names = [self._id(tile, car) for car in ("host", "merging") for tile in range(slots)]
+        cars, digits = ("host", "merging"), len(str(slots - 1))
+        # SUMO looks a car up in a tree of names, which is faster where the names sort as the rows do
+        self._names = [
+            f"{car}.{tile:0{digits}}" if slots > 1 else self._id(tile, car) for car in cars for tile in range(slots)
+        ]
         self._row = {name: row for row, name in enumerate(self._names)}
         self._paths: tuple[Way, Way] = ("main", "ramp") if host == "main" else ("ramp", "main")
         self._by_ramp = self._paths.index("ramp")
@@ -79,7 +83,7 @@ class TiledWorld(GivenWorld):
             check = f"see what 'merge-cosim ramp check {ramp.net.parent}' says"
             raise UserError(f"{ramp.net}: SUMO cannot drive the ramp's paths: {one_line(error)}; {check}") from None
         self._lanes, self._along = LaneMap(ramp), AlongPaths(ramp, slots, self._paths)
-        self._starts: list[list[LanePosition]] = []
+        self._prefixes = [self._id(tile, "") for tile in range(slots)]
         self._driven = self._names
         """Names of the cars that are commanded and read."""
         self._rows: IntArray | None = None
@@ -96,11 +100,14 @@ class TiledWorld(GivenWorld):
     ) -> None:
         """See `World`; looks up where the cars start, as many share a place."""
         super().start(encounters, setting, rules, leader, seed)
-        self._starts = []
+        where: list[list[LanePosition]] = []
         for path, station in zip(self._paths, self.encounters.start, strict=False):
             places = [*zip(station.tolist(), self.encounters.merge_position.tolist(), strict=True)]
             known = {place: self._lanes.place(path, *place) for place in set(places)}
-            self._starts.append([known[place] for place in places])
+            where.append([known[place] for place in places])
+        self._start_lanes = [[f"{one.edge}_{one.lane}" for one in each] for each in where]
+        self._start_positions = np.array([[one.position for one in each] for each in where])
+        self._start_edges = np.array([self._along.numbers(path, each) for path, each in enumerate(where)])
 
     def restart(self) -> None:
         """See `GivenWorld`."""
@@ -123,14 +130,18 @@ class TiledWorld(GivenWorld):
         self._closed_form[:, slots] = start[:2]
         self._changes_at[slots] = -TOLERANCE
         self._merge_position[slots] = self.encounters.merge_position[cases]
-        rows = [*slots.tolist(), *(slots + self.slots).tolist()]
-        names, numbers = [self._names[row] for row in rows], cases.tolist()
-        where = [starts[number] for starts in self._starts for number in numbers]
-        lanes = [self._id(row % self.slots, f"{one.edge}_{one.lane}") for row, one in zip(rows, where, strict=True)]
-        self._along.put(rows, where)
-        positions, speeds = [one.position for one in where], start[2:4].ravel().tolist()
+        rows = np.concatenate([slots, slots + self.slots])
+        tiles, numbers = slots.tolist(), cases.tolist()
+        names = [self._names[row] for row in rows.tolist()]
+        lanes = [
+            self._prefixes[tile] + starts[number]
+            for starts in self._start_lanes
+            for tile, number in zip(tiles, numbers, strict=True)
+        ]
+        positions = self._start_positions.take(cases, axis=1).ravel()
+        self._along.put(rows, self._start_edges.take(cases, axis=1).ravel(), positions)
         begin = perf_counter()
-        self.session.place_all(names, lanes, positions, speeds)
+        self.session.place_all(names, lanes, positions.tolist(), start[2:4].ravel().tolist())
         self.calls_s += perf_counter() - begin
         length = start[4:]
         differs = self._length.take(slots, axis=1) != length
@@ -198,7 +209,8 @@ class TiledWorld(GivenWorld):
         past = self.state[self._by_ramp, slots]  # of the place where the merging car comes onto the host's lane
         if not self.ramp.changes_lane:
             past = past + self._merge_position[slots]
-        lanes = [self._lanes[self.session.lane(self._names[row])] for row in [*(slots + by_main), *(slots + by_ramp)]]
+        rows = [*(slots + by_main).tolist(), *(slots + by_ramp).tolist()]
+        lanes = [self._lanes[self.session.lane(self._names[row])] for row in rows]
         parts = [lane.part if lane else None for lane in lanes]
         for slot, way, main, ramp in zip(slots.tolist(), past.tolist(), parts, parts[len(slots) :], strict=False):
             due = Part.HOST if way > 0.0 else Part.MERGING
@@ -226,7 +238,7 @@ class TiledWorld(GivenWorld):
     def _read(self) -> None:
         begin = perf_counter()
         try:
-            position = np.fromiter(self.session.positions(self._driven), np.float64, len(self._driven))
+            position = self.session.positions(self._driven)
         except self.session.errors:
             raise self._gone() from None
         self.calls_s += perf_counter() - begin
