@@ -129,9 +129,9 @@ class Session:
         self.lane_length: Callable[[str], float] = api.lane.getLength
         self.time: Callable[[], float] = simulation.getTime
 
-    def command(self, cars: Sequence[str], speeds: Sequence[float]) -> None:
-        """Set the speeds of the next step of many vehicles."""
-        deque(map(self.set_speed, cars, speeds), maxlen=0)
+    def command(self, cars: Sequence[str], speeds: FloatArray) -> None:
+        """Set the speeds of the next step of many vehicles [m/s], shape (cars,)."""
+        deque(map(self.set_speed, cars, speeds.data), maxlen=0)
 
     def positions(self, cars: Sequence[str]) -> FloatArray:
         """Positions of the front bumpers of many vehicles on their present lanes [m], shape (cars,)."""

@@ -158,7 +158,7 @@ class TiledWorld(GivenWorld):
             self._change_lanes(self.state[self._by_ramp] + way[self._by_ramp])
         self._closed_form += way
         speeds = speeds.ravel()
-        driven = (speeds if self._rows is None else speeds[self._rows]).tolist()
+        driven = speeds if self._rows is None else speeds[self._rows]
         begin = perf_counter()
         self.session.command(self._driven, driven)
         self.calls_s += perf_counter() - begin
@@ -232,7 +232,7 @@ class TiledWorld(GivenWorld):
         """Let the cars of tiles that have become free stand."""
         idle = [*self._free.tolist(), *(self._free + self.slots).tolist()]
         self._rows = np.flatnonzero(np.tile(self._case >= 0, 2))
-        self.session.command([self._names[row] for row in idle], [0.0] * len(idle))
+        self.session.command([self._names[row] for row in idle], np.zeros(len(idle)))
         self._driven = [self._names[row] for row in self._rows.tolist()]
 
     def _read(self) -> None:
