@@ -33,6 +33,8 @@ class Setting:
 class Observation:
     """One cycle of a batch of encounters, or some cycles of it laid end to end; every array has shape (n,).
 
+    In a run the arrays are views of a record whose room is used again: copy what you keep for later cycles.
+
     Attributes:
         host_station, host_speed: State of the host [m, m/s].
         merging_station, merging_speed: State of the merging car as the host observes it [m, m/s].

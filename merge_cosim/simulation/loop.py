@@ -26,6 +26,9 @@ SCORED_TOGETHER = 128
 """Encounters that are over wait until so many can be scored in one go; their tracks then still fit the cache."""
 SCORED_IN_PLACE = 512
 """The same where the recorder holds all of them, and nothing else needs the cache meanwhile."""
+RECORDED_FIRST, ROOM = 128, 16
+"""Cycles that the recorder holds at first, few enough for the cache, and how many more than the longest encounter has
+lasted it always has room for."""
 THINNED_AT, THINNED_FROM = 0.5, 512
 """Share of slots in use below which the others are left out, and the slots from which on that pays."""
 
@@ -139,16 +142,18 @@ class Loop:
             merging_car.start(encounters, world.slots, setting)
         self._driver = DriverBlocks(driver, world.slots, setting)
         self._channels = () if traced == () else driver.controller.channels
-        self._recorder = Recorder(world.slots, rules.time_out_cycles, len(world.channels), len(self._channels))
+        slot_each = encounters is not None and world.slots >= len(encounters)
+        self._last = np.full(world.slots, -1) if slot_each and traced == () else None
+        """The last cycle in each slot, where every encounter has one to itself: then the recorder holds them all."""
+        longest = RECORDED_FIRST if self._last is None else rules.time_out_cycles
+        self._recorder = Recorder(world.slots, longest, len(world.channels), len(self._channels))
         self._watch = Watch(world.slots, rules)
         self._age, self._over_at = np.zeros((2, 0), dtype=np.int64)
         self._active, self._open = np.zeros((2, 0), dtype=bool)
         self._make_room()
+        self._cycles = 0
         self._effort, self._stepped, self._called = Effort(), world.step_s, world.calls_s
         self._over: dict[int, FloatArray] = {}
-        slot_each = encounters is not None and world.slots >= len(encounters)
-        self._last = np.full(world.slots, -1) if slot_each and traced == () else None
-        """The last cycle in each slot, where every encounter has one to itself: then the recorder holds them all."""
         self._cases, self._origin = np.zeros(world.slots, dtype=np.int64), np.arange(world.slots)
         """Case of each of those slots, and which of them each slot is since others have been left out."""
         self._can_thin = world.can_thin and driver.can_thin and merging_car.can_thin and self._last is not None
@@ -196,6 +201,9 @@ class Loop:
     def after_step(self) -> None:
         """Observe, end what is over and begin what comes next."""
         world = self._world
+        if self._last is None and self._cycles % ROOM == 0:
+            self._recorder.make_room(world.slots, self._longest() + ROOM)
+        self._cycles += 1
         world.observe(*self._recorder.next_cycle())
         self._age += 1
         over = (self._open & self._watch.over(self._age, self._recorder.seen)).nonzero()[0]
@@ -228,7 +236,7 @@ class Loop:
         slots = self._world.slots
         more = slots - len(self._age)
         if self._found:
-            self._recorder.make_room(slots, int((self._age * self._active).max(initial=0)) + 1)
+            self._recorder.make_room(slots, self._longest() + 1)
         if not more:
             return
         self._driver.make_room(slots)
@@ -236,6 +244,10 @@ class Loop:
         self._age, self._over_at = np.pad((self._age, self._over_at), ((0, 0), (0, more)))
         self._active, self._open = np.pad((self._active, self._open), ((0, 0), (0, more)))
         self._speeds = np.zeros((2, slots))
+
+    def _longest(self) -> int:
+        """Cycles that the longest of the running encounters has lasted."""
+        return int((self._age * self._active).max(initial=0))
 
     def _begin(self) -> None:
         begun = self._world.begin()

@@ -130,7 +130,8 @@ class Recorder:
         length, rows, held = self._cycles.shape
         if slots <= held and longest < length:
             return
-        grown = np.zeros((max(2 * length if longest >= length else length, longest + 1), rows, max(slots, held)))
+        wanted = max(length + length // 4, longest + 1) if longest >= length else length
+        grown = np.zeros((wanted, rows, max(slots, held)))
         order = np.arange(self._now - length + 1, self._now + 1)
         grown[:length, :, :held] = self._cycles[order]
         lengths = np.ones((2, grown.shape[2]))

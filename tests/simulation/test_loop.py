@@ -68,10 +68,10 @@ def test_speeds_are_those_that_sumo_reports(ramp, merge_position):
                 world.command(rng.uniform(0, 30, (2, 16)))
                 world.step()
                 for role, speeds in zip(("host", "merging"), world.state[2:], strict=True):
-                    reported = [libsumo.vehicle.getSpeed(f"t{tile}.{role}") for tile in range(16)]
+                    reported = [libsumo.vehicle.getSpeed(f"{role}.{tile:02}") for tile in range(16)]
                     np.testing.assert_allclose(speeds, reported, atol=1e-9)
                 if road.changes_lane:  # in the very cycle in which the front is there
-                    lanes = [libsumo.vehicle.getLaneID(f"t{tile}.merging") for tile in range(16)]
+                    lanes = [libsumo.vehicle.getLaneID(f"merging.{tile:02}") for tile in range(16)]
                     edges = [lane.partition(".")[2].rpartition("_")[0] for lane in lanes]
                     in_host_lane = [
                         edge in road.main_route and lane.endswith(f"_{LaneMap(road).host_lane(edge)}")
