@@ -65,6 +65,9 @@ def estimator(cls: type[E]) -> type[E]:
     return cls
 
 
+_CERTAIN = np.array([-np.inf, np.inf])
+
+
 def certain(not_yield: BoolArray) -> FloatArray:
     """Log-odds of a rule without probabilities: +inf where NOT_YIELD, -inf where YIELD."""
-    return np.where(not_yield, np.inf, -np.inf)
+    return _CERTAIN.take(not_yield)

@@ -14,16 +14,15 @@ Ahead = Literal["clear", "in-lane", "any"]
 is past the merging car's, both past the merging point; `any`: its front is past the merging car's."""
 
 
-def gap_to_host(now: Observation) -> FloatArray:
-    """Gap [m] from the merging car's front to the host's rear, shape (n,); negative where the host is not clear."""
-    return now.host_station - now.merging_station - now.host_length
+def host_ahead(now: Observation, ahead: Ahead) -> tuple[BoolArray, FloatArray]:
+    """Whether the merging driver takes the host to be ahead, and how far it is; shape (n,) each.
 
-
-def host_is_ahead(now: Observation, ahead: Ahead) -> BoolArray:
-    """Whether the merging driver takes the host to be ahead, shape (n,)."""
+    The gap [m] is from the merging car's front to the host's rear, and negative where the host is not clear.
+    """
+    gap = now.host_station - now.merging_station - now.host_length
     if ahead == "clear":
-        return gap_to_host(now) > TOLERANCE
-    host_ahead = now.host_station - now.merging_station > TOLERANCE
+        return gap > TOLERANCE, gap
+    is_ahead = now.host_station - now.merging_station > TOLERANCE
     if ahead == "in-lane":
-        host_ahead &= np.minimum(now.merging_station, now.host_station) >= -TOLERANCE
-    return host_ahead
+        is_ahead &= np.minimum(now.merging_station, now.host_station) >= -TOLERANCE
+    return is_ahead, gap

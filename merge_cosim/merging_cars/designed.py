@@ -9,7 +9,7 @@ from pydantic import NonNegativeFloat
 from merge_cosim.controllers.law import DistanceKeeping
 from merge_cosim.core.observation import Observation
 from merge_cosim.core.units import FloatArray, IntArray
-from merge_cosim.merging_cars.ahead import Ahead, gap_to_host, host_is_ahead
+from merge_cosim.merging_cars.ahead import Ahead, host_ahead
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 
 
@@ -33,6 +33,6 @@ class Designed(DistanceKeeping, MergingCar):
 
     def next_speed(self, age: IntArray, now: Observation) -> FloatArray:
         """One step of the strategy."""
-        ahead, limit = host_is_ahead(now, self.ahead), self.setting.speed_limit
-        acceleration = self.drive(ahead, gap_to_host(now), now.merging_speed, now.host_speed, limit)
+        limit = self.setting.speed_limit
+        acceleration = self.drive(*host_ahead(now, self.ahead), now.merging_speed, now.host_speed, limit)
         return np.maximum(now.merging_speed + acceleration * self.setting.dt, 0.0)

@@ -17,7 +17,7 @@ from merge_cosim.core.encounter import Encounters, Intention
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import normal, stream_keys, uniform
 from merge_cosim.core.units import TOLERANCE, FloatArray, IntArray, Share
-from merge_cosim.merging_cars.ahead import gap_to_host, host_is_ahead
+from merge_cosim.merging_cars.ahead import host_ahead
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 
 IGNORE = int(Intention.UNKNOWN)
@@ -166,5 +166,5 @@ class Hidden(DistanceKeeping, MergingCar):
         return self.clip(np.where(yields, np.minimum(needed, 0.0), np.maximum(needed, 0.0)))
 
     def _behind_or_free(self, now: Observation) -> FloatArray:
-        ahead, limit = host_is_ahead(now, "any"), self.setting.speed_limit
-        return self.drive(ahead, gap_to_host(now), now.merging_speed, now.host_speed, limit)
+        limit = self.setting.speed_limit
+        return self.drive(*host_ahead(now, "any"), now.merging_speed, now.host_speed, limit)

@@ -10,7 +10,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from merge_cosim.core.observation import Observation
 from merge_cosim.core.units import Acceleration, Braking, FloatArray, IntArray
-from merge_cosim.merging_cars.ahead import Ahead, gap_to_host, host_is_ahead
+from merge_cosim.merging_cars.ahead import Ahead, host_ahead
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 
 
@@ -47,7 +47,8 @@ class Idm(MergingCar):
         speed = now.merging_speed
         closing = speed * (speed - now.host_speed) / (2.0 * np.sqrt(self.acceleration * self.braking))
         wanted = self.d0 + np.maximum(speed * self.headway + closing, 0.0)
-        following = np.where(host_is_ahead(now, self.ahead), wanted / np.maximum(gap_to_host(now), 0.1), 0.0)
+        ahead, gap = host_ahead(now, self.ahead)
+        following = np.where(ahead, wanted / np.maximum(gap, 0.1), 0.0)
         free = (speed / self.setting.speed_limit) ** self.exponent
         acceleration = self.acceleration * (1.0 - free - following**2)
         return np.maximum(speed + np.maximum(acceleration, self.min_acceleration) * self.setting.dt, 0.0)

@@ -13,7 +13,7 @@ from merge_cosim.core.encounter import Encounters
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.core.random_streams import stream_keys, uniform
 from merge_cosim.core.units import TOLERANCE, Acceleration, FloatArray, IntArray
-from merge_cosim.merging_cars.ahead import gap_to_host, host_is_ahead
+from merge_cosim.merging_cars.ahead import host_ahead
 from merge_cosim.merging_cars.base import MergingCar, merging_cars
 
 
@@ -62,7 +62,7 @@ class LateAccelerating(DistanceKeeping, MergingCar):
     def next_speed(self, age: IntArray, now: Observation) -> FloatArray:
         """One step: the same speed, full acceleration, or distance keeping."""
         limit = self.setting.speed_limit
-        merged = self.drive(host_is_ahead(now, "any"), gap_to_host(now), now.merging_speed, now.host_speed, limit)
+        merged = self.drive(*host_ahead(now, "any"), now.merging_speed, now.host_speed, limit)
         before = np.where(now.merging_station >= -self._way - TOLERANCE, self.max_acceleration, 0.0)
         acceleration = np.where(now.merging_in_lane, merged, before)
         return np.clip(now.merging_speed + acceleration * self.setting.dt, 0.0, limit)

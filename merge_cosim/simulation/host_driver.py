@@ -70,7 +70,8 @@ class HostDriver:
         """
         seen = self.sensor.observe(now)
         log_odds = _numbers(self.estimator.update(seen), self.estimator, seen)
-        target = np.where(seen.merging_in_lane, seen.merging_ahead, log_odds >= 0.0)
+        target = log_odds >= 0.0
+        np.putmask(target, seen.merging_in_lane, seen.merging_ahead)  # faster than np.where
         if around is not None:
             self.controller.look_around(around)
         acceleration = self.controller.command(seen, log_odds, target)

@@ -77,7 +77,6 @@ class Session:
         teleporting: Vehicles that began to teleport in it.
         pending: Vehicles that wait outside for room.
         expected_count: Vehicles in the net or still to come.
-        colliding: Vehicles in a contact that SUMO reports for the last step.
         lanes, lane_length: All lanes of the net, and the length of one.
         time: Time of the simulation [s].
         close: End the simulation, or the connection.
@@ -108,6 +107,7 @@ class Session:
             self.set_speed, self.lane_position = raw.vehicle_setSpeed, raw.vehicle_getLanePosition
             self.lane, self.speed = raw.vehicle_getLaneID, raw.vehicle_getSpeed
             self._move_to, self._set_previous_speed = raw.vehicle_moveTo, raw.vehicle_setPreviousSpeed
+            self._colliding_number = raw.simulation_getCollidingVehiclesNumber
         self.edge: Callable[[str], str] = vehicle.getRoadID
         self.route: Callable[[str], tuple[str, ...]] = vehicle.getRoute
         self.kind: Callable[[str], str] = vehicle.getTypeID
@@ -124,7 +124,7 @@ class Session:
         self.teleporting: Callable[[], Sequence[str]] = simulation.getStartingTeleportIDList
         self.pending: Callable[[], Sequence[str]] = simulation.getPendingVehicles
         self.expected_count: Callable[[], int] = simulation.getMinExpectedNumber
-        self.colliding: Callable[[], Sequence[str]] = simulation.getCollidingVehiclesIDList
+        self._colliding_number: Callable[[], int] = simulation.getCollidingVehiclesNumber
         self.lanes: Callable[[], Sequence[str]] = api.lane.getIDList
         self.lane_length: Callable[[str], float] = api.lane.getLength
         self.time: Callable[[], float] = simulation.getTime
@@ -137,6 +137,11 @@ class Session:
         """Positions of the front bumpers of many vehicles on their present lanes [m], shape (cars,)."""
         found = np.empty(len(cars))
         struct.pack_into(f"{len(cars)}d", found, 0, *map(self.lane_position, cars))  # faster than np.fromiter
+        return found
+
+    def colliding(self) -> Sequence[str]:
+        """Vehicles in a contact that SUMO reports for the last step; the number is asked first, as it is cheaper."""
+        found: Sequence[str] = self._api.simulation.getCollidingVehiclesIDList() if self._colliding_number() else ()
         return found
 
     def add(self, cars: Iterable[Car]) -> None:
@@ -236,10 +241,9 @@ class Session:
 
     def contacts(self) -> list[Contact]:
         """The contacts that SUMO reports for the last step."""
-        simulation = self._api.simulation
-        if not simulation.getCollidingVehiclesNumber():
+        if not self._colliding_number():
             return []
-        found = simulation.getCollisions()
+        found = self._api.simulation.getCollisions()
         return [Contact(min(c.collider, c.victim), max(c.collider, c.victim), c.lane) for c in found]
 
     def statistic(self, key: str) -> float:

@@ -6,7 +6,7 @@ import pytest
 from merge_cosim.controllers.base import controllers
 from merge_cosim.core.observation import Observation, Setting
 from merge_cosim.estimators.base import estimators
-from merge_cosim.merging_cars.ahead import gap_to_host, host_is_ahead
+from merge_cosim.merging_cars.ahead import host_ahead
 from merge_cosim.merging_cars.hidden import IGNORE, Hidden
 from merge_cosim.merging_cars.idm import Idm
 from merge_cosim.merging_cars.late import LateAccelerating
@@ -92,10 +92,14 @@ def test_late_points_are_drawn_per_case():
 def test_ahead_has_three_meanings():
     station = np.array([-40.0, -45.0 + 5e-7, -49.0, -50.0])
     now = Observation(station, np.full(4, 9.0), np.full(4, -50.0), np.full(4, 9.0), np.full(4, 5.0), np.full(4, 5.0))
-    assert gap_to_host(now) == pytest.approx([5.0, 5e-7, -4.0, -5.0])
-    assert host_is_ahead(now, "clear").tolist() == [True, False, False, False]
-    assert host_is_ahead(now, "any").tolist() == [True, True, True, False]
-    assert host_is_ahead(now, "in-lane").tolist() == [False] * 4
+    for rule, expected in (
+        ("clear", [True, False, False, False]),
+        ("any", [True, True, True, False]),
+        ("in-lane", [False] * 4),
+    ):
+        ahead, gap = host_ahead(now, rule)
+        assert ahead.tolist() == expected
+        assert gap == pytest.approx([5.0, 5e-7, -4.0, -5.0])
 
 
 def script(member):

@@ -177,11 +177,11 @@ class TiledWorld(GivenWorld):
     def ended(self, over: IntArray, age: IntArray) -> Ended | None:
         """See `World`; the stations are compared with the closed form's, in which a difference would have added up."""
         if len(over):
-            apart = np.abs(self.state[:2].take(over, axis=1) - self._closed_form.take(over, axis=1)).max(axis=0)
+            apart = np.abs(self.state[:2].take(over, axis=1) - self._closed_form.take(over, axis=1))
             largest = float(apart.max())
             self.worst_difference_m = max(self.worst_difference_m, largest)
             if not largest <= TOLERANCE:
-                self.breaks("closed_form", over[~(apart <= TOLERANCE)])
+                self.breaks("closed_form", over[~(apart <= TOLERANCE).all(axis=0)])
             self._check_lanes(over)
         return super().ended(over, age)
 
