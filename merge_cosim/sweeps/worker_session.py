@@ -5,8 +5,8 @@ from __future__ import annotations
 from merge_cosim.ramps.ramp import Ramp, Way
 from merge_cosim.simulation.worlds.tiles import TiledWorld
 
-TILES = 192
-"""Encounters side by side in one SUMO. From 128 to 208 tiles a case costs the same: more of them spread the cost of a
+TILES = 256
+"""Encounters side by side in one SUMO. From 192 to 256 tiles a case costs the same: more of them spread the cost of a
 cycle's Python over more cars, but SUMO's own step costs more per car, as more cars fit its cache less well."""
 
 
