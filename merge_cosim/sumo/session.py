@@ -101,6 +101,7 @@ class Session:
         self.speed: Callable[[str], float] = vehicle.getSpeed
         self._move_to: Callable[[str, str, float], object] = vehicle.moveTo
         self._set_previous_speed: Callable[[str, float], object] = vehicle.setPreviousSpeed
+        self._colliding_number: Callable[[], int] = simulation.getCollidingVehiclesNumber
         if getattr(api, "__name__", "") == "libsumo":
             from libsumo import _libsumo as raw  # the raw calls spare a Python frame each
 
@@ -124,7 +125,6 @@ class Session:
         self.teleporting: Callable[[], Sequence[str]] = simulation.getStartingTeleportIDList
         self.pending: Callable[[], Sequence[str]] = simulation.getPendingVehicles
         self.expected_count: Callable[[], int] = simulation.getMinExpectedNumber
-        self._colliding_number: Callable[[], int] = simulation.getCollidingVehiclesNumber
         self.lanes: Callable[[], Sequence[str]] = api.lane.getIDList
         self.lane_length: Callable[[str], float] = api.lane.getLength
         self.time: Callable[[], float] = simulation.getTime
@@ -136,7 +136,7 @@ class Session:
     def positions(self, cars: Sequence[str]) -> FloatArray:
         """Positions of the front bumpers of many vehicles on their present lanes [m], shape (cars,)."""
         found = np.empty(len(cars))
-        struct.pack_into(f"{len(cars)}d", found, 0, *map(self.lane_position, cars))  # faster than np.fromiter
+        struct.pack_into(f"{len(cars)}d", found.data, 0, *map(self.lane_position, cars))  # faster than np.fromiter
         return found
 
     def colliding(self) -> Sequence[str]:

@@ -63,10 +63,12 @@ class TiledWorld(GivenWorld):
         self._id = tile_id if tiled else _own_id
         net = tile_net(ramp, slots) if tiled else ramp.net
         self.session = open_session(SumoOptions(net, seed=seed, extra=extra))
-        cars, digits = ("host", "merging"), len(str(slots - 1))
+        digits = len(str(slots - 1))
         # SUMO looks a car up in a tree of names, which is faster where the names sort as the rows do
         self._names = [
-            f"{car}.{tile:0{digits}}" if slots > 1 else self._id(tile, car) for car in cars for tile in range(slots)
+            f"{car}.{tile:0{digits}}" if slots > 1 else self._id(tile, car)
+            for car in ("host", "merging")
+            for tile in range(slots)
         ]
         self._row = {name: row for row, name in enumerate(self._names)}
         self._paths: tuple[Way, Way] = ("main", "ramp") if host == "main" else ("ramp", "main")
