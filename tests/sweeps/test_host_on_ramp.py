@@ -42,12 +42,12 @@ def test_the_host_drives_on_the_ramp_and_changes_lane(ramp):
     world = session.world(task.ramp, 3, 0, task.scenario.host)
     task.simulate(world)  # whose cars are then where they ended
     road = task.ramp
-    edges = {car: libsumo.vehicle.getRoute(f"t0.{car}") for car in ("host", "merging")}
+    edges = {car: libsumo.vehicle.getRoute(f"{car}.0") for car in ("host", "merging")}
     assert edges == {
         "host": tuple(f"t0.{edge}" for edge in road.ramp_route),
         "merging": tuple(f"t0.{edge}" for edge in road.main_route),
     }
-    lanes = {libsumo.vehicle.getLaneID(f"t0.{car}") for car in ("host", "merging")}
+    lanes = {libsumo.vehicle.getLaneID(f"{car}.0") for car in ("host", "merging")}
     assert lanes <= {f"t0.{section.edge}_{section.lane}" for section in road.main}
     session.close()
 
