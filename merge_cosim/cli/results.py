@@ -237,7 +237,9 @@ def bounds(
     if json:
         print_json(rows)
     else:
-        show_table(rows, f"{scenario}: what any host could have done")
+        places = [" ".join(str(row.pop(name)) for name in ("site", "source")) for row in rows]
+        lines = [{"": name} | {place: row[name] for place, row in zip(places, rows, strict=True)} for name in rows[0]]
+        show_table(lines[1:], f"{scenario}: what any host could have done")
 
 
 @app.command()

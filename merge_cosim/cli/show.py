@@ -50,12 +50,25 @@ def verification(found: Verification) -> dict[str, Any]:
 
 
 def show_verification(found: Verification, only_beyond: bool = False) -> None:
-    """Print what came out of running rows again, with the columns that differ, or only those beyond the tolerance."""
-    rows = verification(found)["differences"]
-    if rows and (found.beyond or not only_beyond):
-        exact = [{k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows]
-        show_table(exact, "what differs")
-    for line in (*found.notes, str(found)):
+    """Print what came out of running rows again: the columns that differ, and the values beyond the tolerance."""
+    lines: list[str] = []
+    if len(found.differences) and (found.beyond or not only_beyond):
+        shown = []
+        for row in verification(found)["differences"]:
+            largest = "" if row["largest"] is None else f"{row['largest']:.1e}"
+            place = ", ".join(
+                str(row[name]) for name in ("method", "scenario", "variation", "case", "model") if row[name]
+            )
+            shown.append(
+                {name: row[name] for name in ("column", "differ", "beyond")} | {"largest": largest, "in": place}
+            )
+            if row["beyond"]:
+                stored, again = (
+                    f"{value:.6g}" if isinstance(value, float) else value for value in (row["stored"], row["again"])
+                )
+                lines.append(f"{row['column']}: {stored} stored, {again} again, in {place}")
+        show_table(shown, "what differs")
+    for line in (*lines, *found.notes, str(found)):
         print(line)
 
 

@@ -157,7 +157,10 @@ def traffic_tables(path: Path, wide: bool = False) -> list[ShortTable]:
 
 
 def compared_tables(table: Table) -> list[ShortTable]:
-    """What `comparison.compare` found, in 80 columns: one table per row where two methods were compared."""
+    """What `comparison.compare` found, in 80 columns.
+
+    One table per scenario and variation, or per row where two methods were compared.
+    """
     if "method" in table.data:
         shown = [
             replace(column, heading=f"{LINES[column.name[:-2]]}\n{column.name[-1].upper()}")
@@ -168,9 +171,10 @@ def compared_tables(table: Table) -> list[ShortTable]:
             for column in table.columns
             if column.name in COMPARED
         ]
+        rows = table.data.assign(variation=table.data.get("variation", "")).fillna({"variation": ""})
         return [
-            _table(str(scenario), [], part.assign(variation=part.get("variation"), reference=False), shown)
-            for scenario, part in table.data.groupby("scenario", sort=False)
+            _table(f"{scenario} {variation}".rstrip(), [], part.assign(variation=None, reference=False), shown)
+            for (scenario, variation), part in rows.groupby(["scenario", "variation"], sort=False)
         ]
     return [_beside(row, [column for column in table.columns if column.group]) for row in table.data.to_dict("records")]
 

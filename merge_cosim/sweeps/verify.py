@@ -57,7 +57,8 @@ class Verification:
         begin = f"{self.path}: {self.rows:,} of {self.stored:,} rows run again in SUMO: "
         if self.beyond:
             columns = ", ".join(self.differences.loc[self.differences["beyond"] > 0, "column"])
-            return f"{begin}{self.beyond:,} values differ beyond the tolerance, in {columns}"
+            values = "value differs" if self.beyond == 1 else "values differ"
+            return f"{begin}{self.beyond:,} {values} beyond the tolerance, in {columns}"
         if not len(self.differences):
             return f"{begin}every value is the same"
         worst = self.differences.sort_values("largest", kind="stable").iloc[-1]

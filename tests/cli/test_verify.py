@@ -1,6 +1,7 @@
 """`verify` and `sweep --verify` through the real command line."""
 
 import json
+import re
 import shutil
 
 import pandas as pd
@@ -57,7 +58,17 @@ def test_a_changed_value_is_found_and_changed_versions_are_named(swept):
     beyond = {line["column"]: line["beyond"] for line in found["differences"]}
     assert beyond["failed"] == 132
     assert beyond["delay_s"] > 0
-    assert "values differ beyond the tolerance" in merge_cosim("verify", swept, "--jobs", 2, cwd=swept.parent).stdout
+    printed = merge_cosim("verify", swept, "--jobs", 2, cwd=swept.parent).stdout
+    assert "values differ beyond the tolerance" in printed
+    table, values = printed.split("failed: ", 1)
+    assert max(map(len, table.splitlines())) <= 80
+    assert re.search(r"^delay_s: \S+ stored, \S+ again, in \w+, small, ", values, re.MULTILINE)
+
+
+def test_variations_are_compared_in_80_columns(verified):
+    printed = merge_cosim("compare", "out", "out", cwd=verified.parent).stdout
+    assert "\nsmall acc.headway=2 (cases each: 75)\n" in printed
+    assert max(map(len, printed.splitlines())) <= 80
 
 
 def test_scenes_of_traffic_are_run_again_as_they_were(tmp_path):
