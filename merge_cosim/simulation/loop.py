@@ -202,7 +202,8 @@ class Loop:
         """Observe, end what is over and begin what comes next."""
         world = self._world
         if self._last is None and self._cycles % ROOM == 0:
-            self._recorder.make_room(world.slots, self._longest() + ROOM)
+            longest = int((self._age * self._active).max(initial=0))
+            self._recorder.make_room(world.slots, longest + ROOM)
         self._cycles += 1
         world.observe(*self._recorder.next_cycle())
         self._age += 1
@@ -235,19 +236,14 @@ class Loop:
         """Grow with the world, which may add slots."""
         slots = self._world.slots
         more = slots - len(self._age)
-        if self._found:
-            self._recorder.make_room(slots, self._longest() + 1)
         if not more:
             return
+        self._recorder.make_room(slots, 0)
         self._driver.make_room(slots)
         self._watch.make_room(slots)
         self._age, self._over_at = np.pad((self._age, self._over_at), ((0, 0), (0, more)))
         self._active, self._open = np.pad((self._active, self._open), ((0, 0), (0, more)))
         self._speeds = np.zeros((2, slots))
-
-    def _longest(self) -> int:
-        """Cycles that the longest of the running encounters has lasted."""
-        return int((self._age * self._active).max(initial=0))
 
     def _begin(self) -> None:
         begun = self._world.begin()
