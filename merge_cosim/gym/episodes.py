@@ -197,6 +197,5 @@ class Episodes(Loop):
         last = features(self._observed.take(slots), self._names)
         self.over = Over(slots, failed, failed | columns["scored_to_end"], last, info)
         self._active[slots] = self._open[slots] = False
-        self._age[slots] = 0
         following = self._random.integers(len(self._world.encounters), size=len(slots) if self._endless else 0)
         self._pairs.line_up(following)

@@ -125,6 +125,17 @@ def test_vectors_are_those_of_gymnasium():
     assert (env.reset()[0] != first[0]).any()
 
 
+def test_the_time_stands_when_an_encounter_has_ended():
+    env, steps, over = MergeEnv(settings=FEW), 0, False
+    env.reset(seed=0)
+    while not over:
+        *_, terminated, truncated, _ = env.step(np.array([0.0], dtype=np.float32))
+        over, steps = terminated or truncated, steps + 1
+    assert env.episodes.time[0] == pytest.approx(0.1 * steps)
+    env.reset(seed=0)
+    assert env.episodes.time[0] == 0.0
+
+
 def test_what_runs_into_the_time_out_is_truncated():
     env = MergeEnv(settings=FEW)
     env.reset(seed=1)
